@@ -1,0 +1,124 @@
+"""What models need to know of a pair of directions, each quantity computed only when it is asked for.
+
+    H = wi + wo,  p = Hx/Hz,  q = Hy/Hz,  e2 = p^2 + q^2 = tan^2 theta_h,  h.wo = |H|/2
+
+Everything follows from the half vector's slopes, so no angle is computed and nothing is lost near the normal or at
+the horizon (tests/test_geometry.py). Inputs are made safe here once: a pair with a direction at or below the horizon
+is evaluated at the normal and masked afterwards, and a cosine below `FLOOR` is evaluated there. That floor (9e-13 in
+float32, 4e-121 in float64) keeps every model's value finite in its whole box; it lies far under the rounding of a
+unit vector's components.
+"""
+
+from collections.abc import Iterable
+from functools import cached_property
+from typing import NamedTuple, cast
+
+import torch
+from torch import Tensor
+
+from ._types import Directions, Mask, Quantity
+from .errors import InvalidValueError
+
+FLOOR = {torch.float32: 2.0**-40, torch.float64: 2.0**-400}
+
+_NOT_ASKED_FOR = cast(Tensor, None)  # arithmetic with a quantity that `needs` does not name fails at once
+
+
+class Geometry(NamedTuple):
+    """The quantities that were asked for, each (..., 1); a plain tuple of tensors, so it crosses vmap and compile."""
+
+    above: Mask  # both directions above the horizon
+    ci: Quantity = _NOT_ASKED_FOR  # cos theta_i
+    co: Quantity = _NOT_ASKED_FOR  # cos theta_o
+    hz: Quantity = _NOT_ASKED_FOR  # ci + co, the height of the unnormalised half vector
+    p: Quantity = _NOT_ASKED_FOR  # slope of the half vector along x
+    q: Quantity = _NOT_ASKED_FOR  # slope of the half vector along y
+    e2: Quantity = _NOT_ASKED_FOR  # p^2 + q^2
+    h_dot_wo: Quantity = _NOT_ASKED_FOR  # cosine between half vector and either direction
+
+    def detach(self) -> "Geometry":
+        """The same quantities without their history, to be kept."""
+        return Geometry(*(None if value is None else value.detach() for value in self))
+
+
+QUANTITIES = frozenset(Geometry._fields) - {"above"}
+
+
+class _OnDemand:
+    """Computes each quantity of a pair of directions at most once."""
+
+    def __init__(self, wi: Tensor, wo: Tensor) -> None:
+        self.above = (wi[..., 2:] > 0) & (wo[..., 2:] > 0)
+        normal = torch.tensor([0.0, 0.0, 1.0], dtype=wi.dtype, device=wi.device)
+        self.wi = torch.where(self.above, wi, normal)
+        self.wo = torch.where(self.above, wo, normal)
+        self.floor = FLOOR[wi.dtype]
+
+    @cached_property
+    def ci(self) -> Tensor:
+        return self.wi[..., 2:].clamp(min=self.floor)
+
+    @cached_property
+    def co(self) -> Tensor:
+        return self.wo[..., 2:].clamp(min=self.floor)
+
+    @cached_property
+    def hz(self) -> Tensor:
+        return self.ci + self.co
+
+    @cached_property
+    def hx(self) -> Tensor:
+        return self.wi[..., :1] + self.wo[..., :1]
+
+    @cached_property
+    def hy(self) -> Tensor:
+        return self.wi[..., 1:2] + self.wo[..., 1:2]
+
+    @cached_property
+    def p(self) -> Tensor:
+        return self.hx / self.hz
+
+    @cached_property
+    def q(self) -> Tensor:
+        return self.hy / self.hz
+
+    @cached_property
+    def e2(self) -> Tensor:
+        return self.p.square() + self.q.square()
+
+    @cached_property
+    def h_dot_wo(self) -> Tensor:
+        return 0.5 * torch.sqrt(self.hx.square() + self.hy.square() + self.hz.square())
+
+
+def geometry(wi: Directions, wo: Directions, needs: Iterable[str]) -> Geometry:
+    """The quantities that `needs` names, for directions of one floating dtype; raises for other dtypes and shapes."""
+    for name, w in (("wi", wi), ("wo", wo)):
+        if w.ndim == 0 or w.shape[-1] != 3:
+            raise InvalidValueError(
+                f"Expected {name} to be unit vectors on a last axis of length 3, got shape {tuple(w.shape)}. "
+                "Pass directions as (..., 3).",
+                field=name,
+            )
+        if w.dtype not in FLOOR:
+            raise InvalidValueError(
+                f"Expected {name} to be float32 or float64, got {w.dtype}. Convert it with {name}.float().", field=name
+            )
+    if wi.dtype != wo.dtype:
+        dtype = torch.promote_types(wi.dtype, wo.dtype)
+        wi, wo = wi.to(dtype), wo.to(dtype)
+    on_demand = _OnDemand(wi, wo)
+    return Geometry(above=on_demand.above, **{name: getattr(on_demand, name) for name in needs})
+
+
+def from_angles(theta: Tensor, phi: Tensor) -> Directions:
+    """Unit vectors (..., 3) of polar angle theta and azimuth phi [radians]."""
+    theta, phi = torch.broadcast_tensors(theta, phi)
+    sine = torch.sin(theta)
+    return torch.stack([sine * torch.cos(phi), sine * torch.sin(phi), torch.cos(theta)], dim=-1)
+
+
+def reflect(wo: Directions, p: Quantity, q: Quantity) -> Directions:
+    """The direction that mirrors wo at the half vector of slopes p, q: 2 (h.wo) h - wo, shape (..., 3)."""
+    h = torch.cat(torch.broadcast_tensors(p, q, torch.ones_like(p)), dim=-1)
+    return 2 * (h * wo).sum(-1, keepdim=True) / h.square().sum(-1, keepdim=True) * h - wo

@@ -1,0 +1,72 @@
+"""Lobes whose half vector has Gaussian slopes: Ward's family and Kurt's.
+
+    E = exp(-(p^2/ax^2 + q^2/ay^2))                                           [1]
+    p_h = E / (pi ax ay cos^3 theta_h)                                        [1/sr of the half vector]
+    p = ax r cos 2 pi t,  q = ay r sin 2 pi t,  r = sqrt(-log1p(-s))
+
+Source: Ward 1992; Walter 2005 eqs. 6-9; Kurt et al. 2010 eqs. 16-20. Departure: sampled and evaluated in slopes, so
+that no quadrant is lost and s = 0 is no special case. Powers of 1/cos theta_h are multiplied onto exp(-Q/2), which
+cannot overflow where E is 0.
+"""
+
+import math
+
+import torch
+from torch import Tensor
+
+from ..geometry import Geometry
+from ..parameters import Parameter, Values
+from ._half_vector import HalfVectorLobe
+
+
+class GaussianSlopes(HalfVectorLobe):
+    """A half-vector lobe with a Gaussian distribution of slopes; widths are rms slopes times sqrt 2."""
+
+    widths_along = ("a", "ax", "ay")
+
+    @property
+    def width_parameters(self) -> tuple[Parameter, ...]:
+        """The declared width or widths [1], each in [1e-4, 10]."""
+        along = {0: "", 1: " along x", 2: " along y"}
+        return tuple(
+            Parameter(
+                name,
+                0.1,
+                1e-4,
+                10.0,
+                f"root-mean-square slope times sqrt 2{along[self.widths_along.index(name)]} [1]",
+                search=(0.005, 1.5),
+                scale="log",
+            )
+            for name in self.width_names
+        )
+
+    @property
+    def slope_needs(self) -> frozenset[str]:
+        """The quantities that `exponent` reads."""
+        return frozenset({"p", "q"} if self.anisotropic else {"e2"})
+
+    @property
+    def pdf_needs(self) -> frozenset[str]:
+        """The quantities of the geometry that the density reads."""
+        return self.slope_needs | {"e2", "h_dot_wo"}
+
+    def exponent(self, values: Values, g: Geometry) -> Tensor:
+        """Q = p^2/ax^2 + q^2/ay^2 [1], (..., 1), so that E = exp(-Q)."""
+        wx, wy = self.widths(values)
+        if self.anisotropic:
+            return (g.p / wx).square() + (g.q / wy).square()
+        return g.e2 / wx.square()
+
+    def slopes(self, values: Values, u: Tensor) -> tuple[Tensor, Tensor]:
+        """Gaussian slopes p, q (..., 1)."""
+        wx, wy = self.widths(values)
+        r = torch.sqrt(-torch.log1p(-u[..., :1]))
+        t = 2 * math.pi * u[..., 1:]
+        return wx * r * torch.cos(t), wy * r * torch.sin(t)
+
+    def half_vector_density(self, values: Values, g: Geometry) -> Tensor:
+        """E / (pi ax ay cos^3 theta_h) [1/sr], (..., 1)."""
+        wx, wy = self.widths(values)
+        root = torch.exp(-0.5 * self.exponent(values, g))
+        return (root * (1 + g.e2)) * (root * torch.sqrt(1 + g.e2)) / (math.pi * wx * wy)

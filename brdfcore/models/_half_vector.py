@@ -1,0 +1,58 @@
+"""What every lobe around the half vector shares: its width options, and sampling by the half vector.
+
+wi = reflect(wo, h) for a half vector h drawn from the lobe. Both width layouts are one lobe: isotropic declares and
+evaluates a single width, anisotropic one along x and one along y.
+"""
+
+from abc import abstractmethod
+from typing import ClassVar
+
+from torch import Tensor
+
+from ..geometry import Geometry, reflect
+from ..parameters import Parameter, Values
+from .base import Model
+
+ISOTROPY = ("isotropic", "anisotropic")
+
+
+class HalfVectorLobe(Model):
+    """A lobe with one width or two, sampled by its half vector."""
+
+    option_groups: ClassVar[tuple[tuple[str, ...], ...]] = (ISOTROPY,)
+    widths_along: ClassVar[tuple[str, str, str]]  # the width's names: isotropic, along x, along y
+
+    @property
+    def anisotropic(self) -> bool:
+        """Whether the two principal directions have widths of their own."""
+        return "anisotropic" in self.options
+
+    @property
+    def width_names(self) -> tuple[str, ...]:
+        """The names of the width parameters that the options declare."""
+        return self.widths_along[1:] if self.anisotropic else self.widths_along[:1]
+
+    def widths(self, values: Values) -> tuple[Tensor, Tensor]:
+        """The widths along x and along y."""
+        return values[self.width_names[0]], values[self.width_names[-1]]
+
+    @property
+    @abstractmethod
+    def width_parameters(self) -> tuple[Parameter, ...]:
+        """The declared width or widths."""
+
+    @abstractmethod
+    def slopes(self, values: Values, u: Tensor) -> tuple[Tensor, Tensor]:
+        """Slopes p, q (..., 1) of half vectors drawn from the lobe, for u (..., 2)."""
+
+    @abstractmethod
+    def half_vector_density(self, values: Values, g: Geometry) -> Tensor:
+        """The density of `slopes`, per solid angle of the half vector [1/sr], (..., 1)."""
+
+    def sample(self, values: Values, wo: Tensor, u: Tensor) -> Tensor:
+        """Directions wi (..., 3); one below the horizon is part of the density's lost share and weighs 0."""
+        return reflect(wo, *self.slopes(values, u))
+
+    def pdf(self, values: Values, g: Geometry) -> Tensor:
+        """p_h / (4 h.wo) [1/sr] (Walter 2005 eq. 8, Ashikhmin and Shirley techreport eq. 20)."""
+        return self.half_vector_density(values, g) / (4 * g.h_dot_wo)

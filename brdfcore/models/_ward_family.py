@@ -1,0 +1,30 @@
+"""What Ward's lobe and its successors share: rs E / (pi ax ay) times a shadowing-like factor of their own."""
+
+import math
+from abc import abstractmethod
+
+import torch
+from torch import Tensor
+
+from ..geometry import Geometry
+from ..parameters import Values
+from ._gaussian_slopes import GaussianSlopes
+from ._scaled_lobe import ScaledLobe
+
+
+class WardFamily(ScaledLobe, GaussianSlopes):
+    """A Gaussian-slope lobe under a specular reflectance."""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """The quantities of the geometry that the lobe reads."""
+        return self.slope_needs | set(self.lobe_needs)
+
+    @abstractmethod
+    def factor(self, g: Geometry, e: Tensor) -> Tensor:
+        """E times what tells the family's members apart [1], (..., 1)."""
+
+    def lobe(self, values: Values, g: Geometry) -> Tensor:
+        """The lobe for rs = 1 [1/sr], (..., 1)."""
+        wx, wy = self.widths(values)
+        return self.factor(g, torch.exp(-self.exponent(values, g))) / (math.pi * wx * wy)

@@ -1,0 +1,29 @@
+"""Kurt, Szirmay-Kalos and Krivanek's anisotropic lobe for data fitting.
+
+    f(wi, wo) = ks F D / (4 (h.wo) (ci co)^alpha)                                           [1/sr]
+    D = E / (pi mx my cos^4 theta_h),  E = exp(-(p^2/mx^2 + q^2/my^2)),  F = f0 + (1 - f0) (1 - h.wo)^5
+
+ks, specular reflectance [1]; f0, Fresnel reflectance at normal incidence [1]; mx, my, root-mean-square slopes times
+sqrt 2 along x and y [1], or one width m; alpha, shadowing exponent [1].
+Reciprocal. Conserves energy for alpha = 0; for every alpha > 0 the directional albedo diverges towards grazing,
+although the paper calls suitable alpha plausible.
+Source: SIGGRAPH Computer Graphics 44(1), 2010, eqs. 4, 5, 10, 12; sampling eqs. 16-19, density eq. 20, weight eq. 21.
+Departure: evaluated from the half vector's slopes p, q, so nothing is lost near the normal or at the horizon.
+"""
+
+from torch import Tensor
+
+from ..geometry import Geometry
+from ..parameters import Parameter, Values
+from ._kurt_family import KurtFamily
+
+
+class Kurt(KurtFamily):
+    """A Gaussian-slope lobe whose shadowing exponent is fitted to the material."""
+
+    name = "kurt"
+    shape = (Parameter("alpha", 0.1, 0.0, 1.0, "shadowing exponent [1]", search=(0.0, 0.5)),)
+
+    def shadowing(self, values: Values, g: Geometry) -> Tensor:
+        """(ci co)^alpha [1], (..., 1)."""
+        return (g.ci * g.co) ** values["alpha"]

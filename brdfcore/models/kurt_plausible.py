@@ -1,0 +1,27 @@
+"""Kurt, Szirmay-Kalos and Krivanek's lobe with the max(ci, co) shadowing term.
+
+    f(wi, wo) = ks F D / (4 (h.wo) max(ci, co))                                             [1/sr]
+    D = E / (pi mx my cos^4 theta_h),  E = exp(-(p^2/mx^2 + q^2/my^2)),  F = f0 + (1 - f0) (1 - h.wo)^5
+
+ks, specular reflectance [1]; f0, Fresnel reflectance at normal incidence [1]; mx, my, root-mean-square slopes times
+sqrt 2 along x and y [1], or one width m.
+Reciprocal. The paper calls it physically plausible; for rough lobes it is not (directional albedo 1.04 at m = 2).
+Source: SIGGRAPH Computer Graphics 44(1), 2010, eq. 9; sampling eqs. 16-19. Departure: evaluated from slopes.
+"""
+
+import torch
+from torch import Tensor
+
+from ..geometry import Geometry
+from ..parameters import Values
+from ._kurt_family import KurtFamily
+
+
+class KurtPlausible(KurtFamily):
+    """The lobe without a shadowing exponent."""
+
+    name = "kurt_plausible"
+
+    def shadowing(self, values: Values, g: Geometry) -> Tensor:
+        """max(ci, co) [1], (..., 1)."""
+        return torch.maximum(g.ci, g.co)

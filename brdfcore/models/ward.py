@@ -1,0 +1,26 @@
+"""Ward's anisotropic lobe.
+
+    f(wi, wo) = rs E / (4 pi ax ay sqrt(ci co)),   E = exp(-(p^2/ax^2 + q^2/ay^2))          [1/sr]
+
+rs, specular reflectance [1]; ax, ay, root-mean-square slopes times sqrt 2 along x and y [1], or one width a.
+Reciprocal. The directional albedo stays below rs at steep angles and diverges towards grazing.
+Source: Ward 1992; Walter 2005 eqs. 3, 4; sampling eqs. 6, 7, 9. Departure: the published form with the exact exponent,
+not Ward's computational approximation of it.
+"""
+
+import torch
+from torch import Tensor
+
+from ..geometry import Geometry
+from ._ward_family import WardFamily
+
+
+class Ward(WardFamily):
+    """Ward's original normalisation."""
+
+    name = "ward"
+    lobe_needs = ("ci", "co")
+
+    def factor(self, g: Geometry, e: Tensor) -> Tensor:
+        """E / (4 sqrt(ci co)) [1], (..., 1)."""
+        return e / (4 * torch.sqrt(g.ci) * torch.sqrt(g.co))
