@@ -1,23 +1,28 @@
 """Analyse and fit surface reflectance: differentiable BRDF models, true sampling, fits with honest intervals.
 
-import brdfcore as bc
+    import brdfcore as bc
 
-samples = bc.read("garnet_red.brdf")
-fit = bc.fit(samples, "lambert + kurt")
-print(fit.report())
-bc.plots.save(bc.plots.lobes(fit.material, samples), "garnet_red.svg")
+    samples = bc.read("garnet_red.brdf")
+    fit = bc.fit(samples, "lambert + kurt")
+    print(fit.report())
+    bc.plots.save(bc.plots.lobes(fit.material, samples), "garnet_red.svg")
+
+The names are loaded when they are first used, so that `brdf --help` and the service's client start without torch.
 """
 
+import importlib
 from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from . import errors, plots
+    from .fitting import LOSSES, OPTIMIZERS, Fit, Progress, fit
+    from .formats import FORMATS, read
+    from .formats.samples import QUANTITIES, Samples
+    from .models import MODELS, Model
+    from .models.material import Material, material
 
 __version__ = version("brdfcore")
-
-from . import errors, plots
-from .fitting import LOSSES, OPTIMIZERS, Fit, Progress, fit
-from .formats import FORMATS, read
-from .formats.samples import QUANTITIES, Samples
-from .models import MODELS, Model
-from .models.material import Material, material
 
 __all__ = [
     "FORMATS",
@@ -37,3 +42,26 @@ __all__ = [
     "plots",
     "read",
 ]
+
+_MODULES = {
+    ".fitting": ("LOSSES", "OPTIMIZERS", "Fit", "Progress", "fit"),
+    ".formats": ("FORMATS", "read"),
+    ".formats.samples": ("QUANTITIES", "Samples"),
+    ".models": ("MODELS", "Model"),
+    ".models.material": ("Material", "material"),
+}
+_HOME = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    if name in ("errors", "plots"):
+        return importlib.import_module(f".{name}", __name__)
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name], __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

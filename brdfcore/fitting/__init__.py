@@ -1,6 +1,6 @@
 """Fits of materials to measured samples."""
 
-from .fit import Progress, errors, fit
+from ._fit import Progress, errors, fit
 from .losses import LOSSES
 from .plan import OPTIMIZERS, check
 from .result import Cost, Fit

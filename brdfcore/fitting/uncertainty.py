@@ -17,7 +17,8 @@ from torch.func import jvp
 
 from .problem import Problem
 
-CONFIDENCE = 0.95
+NORMAL_QUANTILE = 1.959963984540054  # leaves 2.5 % above it
+_PRESSED = 1e-7  # cosine between residuals and a column of J below which nothing presses a value against its end
 _RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding: J's own digits, squared
 
 
@@ -34,9 +35,12 @@ class Uncertainty:
 
 def uncertainty(problem: Problem, x: Tensor) -> Uncertainty:
     """The uncertainties of the optimum x (D,)."""
+    if problem.size == 0:
+        return Uncertainty(x, x, x, x.bool(), x.bool())
     gram = problem.gram(x.unsqueeze(0))
     matrix, meat, freedom = gram.matrix[0], _meat(problem, x), problem.residual_count
-    held = problem.held(x.unsqueeze(0), gram.gradient)[0]
+    pressed = gram.gradient[0].abs() > _PRESSED * (matrix.diagonal() * gram.loss).sqrt()
+    held = problem.held(x.unsqueeze(0), gram.gradient)[0] & pressed
     undetermined = _undetermined(matrix, held)
     free = ~(held | undetermined)
     freedom -= int(free.sum())
@@ -49,7 +53,7 @@ def uncertainty(problem: Problem, x: Tensor) -> Uncertainty:
         inverse = scale.unsqueeze(-1) * inverse * scale
         covariance[at.unsqueeze(-1), at] = inverse @ meat[at][:, at] @ inverse
     error = covariance.diagonal().sqrt()
-    factor = t_quantile(freedom) if problem.data.sigma is None else 1.959963984540054
+    factor = t_quantile(freedom) if problem.data.sigma is None else NORMAL_QUANTILE
     return Uncertainty(*_natural(problem, x, error, factor), undetermined, held)
 
 
@@ -103,10 +107,19 @@ def _natural(problem: Problem, x: Tensor, error: Tensor, factor: float) -> tuple
 def t_quantile(freedom: int) -> float:
     """Student's t that leaves 2.5 % above it, for so many degrees of freedom; relative error below 1e-9.
 
-    Found by bisection of the distribution function, whose integral over theta = atan(t / sqrt(freedom)) is smooth.
+    From 1000 degrees on by its expansion about the normal quantile (Abramowitz and Stegun 26.7.5), below by bisection
+    of the distribution function, whose integral over theta = atan(t / sqrt(freedom)) is smooth.
     """
     if freedom <= 0:
         return math.nan
+    if freedom >= 1000:
+        z = NORMAL_QUANTILE
+        expansion = (
+            (z**3 + z) / 4,
+            (5 * z**5 + 16 * z**3 + 3 * z) / 96,
+            (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
+        )
+        return z + math.fsum(term / freedom**k for k, term in enumerate(expansion, start=1))
     nodes = torch.linspace(0, 1, 2001, dtype=torch.float64)
     simpson = torch.ones_like(nodes)
     simpson[1:-1:2], simpson[2:-1:2] = 4, 2
@@ -120,5 +133,5 @@ def t_quantile(freedom: int) -> float:
     low, high = 1.9, 13.0  # the quantiles of an infinite and of one degree of freedom lie between
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if above_zero(middle) < CONFIDENCE / 2 else (low, middle)
+        low, high = (middle, high) if above_zero(middle) < 0.475 else (low, middle)
     return 0.5 * (low + high)

@@ -114,7 +114,7 @@ class Material(nn.Module):
         return self.form.sample(self._values_like(wo), wo, u.to(wo))
 
     def weight(self, wi: Directions, wo: Directions) -> Spectrum:
-        """The quotient f cos theta_i / pdf [1], (..., C), a sampled direction's contribution; 0 where the density is 0."""
+        """The quotient f cos theta_i / pdf [1], (..., C), which a sample contributes; 0 where the density is."""
         density = self.pdf(wi, wo).unsqueeze(-1)
         drawn = density > 0
         return torch.where(drawn, self.f(wi, wo) * wi[..., 2:] / torch.where(drawn, density, 1.0), 0.0)

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 
 _STYLE: Any = {
-    "font.size": 9,
-    "axes.titlesize": 10,
     "svg.hashsalt": "brdfcore",  # the same figure is the same file
     "svg.fonttype": "none",  # text stays text
 }
@@ -24,7 +22,7 @@ def new_figure(width: float, height: float) -> "Figure":
     """An empty figure of a size in inches, without pyplot's global state."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), layout="constrained")
+    return Figure(figsize=(width, height))
 
 
 def to_bytes(figure: "Figure", kind: Literal["svg", "png"]) -> bytes:

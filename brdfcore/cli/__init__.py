@@ -1,0 +1,30 @@
+"""The command line: one file a command. Nothing here loads torch before a command needs it."""
+
+import sys
+
+import typer
+
+from . import demo, fit, models, serve
+
+app = typer.Typer(
+    name="brdf",
+    help="Analyse and fit surface reflectance (BRDFs).",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command("fit")(fit.command)
+app.command("models")(models.command)
+app.command("serve")(serve.command)
+app.command("demo")(demo.command)
+
+
+def main() -> None:
+    """Run the command that was typed; a mistake of the user's is one sentence and exit code 2."""
+    from ..errors import BrdfError
+
+    try:
+        app()
+    except BrdfError as error:
+        typer.echo(f"brdf: {error}", err=True)
+        sys.exit(2)

@@ -1,0 +1,87 @@
+"""`brdf fit FILE --model TEXT`: fits a measured file and prints what came out."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ..fitting import Fit, Progress
+
+
+def command(
+    file: Annotated[Path, typer.Argument(help="A measured file of any known format.", show_default=False)],
+    model: Annotated[str, typer.Option(help='A material, as in "lambert + ward_bounded".', show_default=False)],
+    loss: Annotated[str, typer.Option(help="cosine, l2, log, cube_root or relative.")] = "cosine",
+    optimizer: Annotated[str, typer.Option(help="auto, least_squares, lbfgs or adam.")] = "auto",
+    fixed: Annotated[list[str] | None, typer.Option(help="KEY=VALUE to keep, as kurt.f0=0.04; repeatable.")] = None,
+    gray: Annotated[list[str] | None, typer.Option(help="A key with one value for all channels; repeatable.")] = None,
+    per_channel: Annotated[list[str] | None, typer.Option(help="An f0 with a value a channel; repeatable.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the scan for starts.")] = 0,
+    format_: Annotated[str | None, typer.Option("--format", help="Insist on a format; else its content tells.")] = None,
+    quantity: Annotated[
+        str | None, typer.Option(help="brdf, brdf_cos or reflectance_factor, where the file does not say.")
+    ] = None,
+    angle_unit: Annotated[str | None, typer.Option(help="degrees or radians, where the file does not say.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    plot: Annotated[Path | None, typer.Option(help="Write the lobe plot to this .svg or .png file.")] = None,
+    scale: Annotated[str, typer.Option(help="Of the plot's radius: linear, cube_root or log.")] = "linear",
+) -> None:
+    """Fit a material to a measured file; print parameters with 95 % intervals, errors and cost."""
+    import brdfcore as bc
+
+    samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit)
+
+    def run(progress: "Callable[[Progress], None] | None") -> "Fit":
+        return bc.fit(
+            samples,
+            model,
+            loss=loss,
+            optimizer=optimizer,
+            fixed=dict(_pair(text) for text in fixed or []),
+            gray=gray or (),
+            per_channel=per_channel or (),
+            seed=seed,
+            progress=progress,
+        )
+
+    result = _with_bar(run)
+    typer.echo(json.dumps(result.to_dict(), indent=2) if as_json else result.report())
+    if plot is not None:
+        figure = bc.plots.lobes(result.material, samples, scale=scale)
+        typer.echo(f"Lobe plot: {bc.plots.save(figure, plot)}", err=as_json)
+
+
+def _pair(text: str) -> tuple[str, float]:
+    """The key and the number of KEY=VALUE."""
+    from ..errors import ParameterError
+
+    key, _, value = text.partition("=")
+    try:
+        return key.strip(), float(value)
+    except ValueError as error:
+        raise ParameterError(
+            f"Expected --fixed to be KEY=NUMBER, got {text!r}. Write it like kurt.f0=0.04.", field="fixed"
+        ) from error
+
+
+def _with_bar(run: "Callable[[Callable[[Progress], None] | None], Fit]") -> "Fit":
+    """The result of `run`, which gets a progress callback; the bar shows on a terminal's error output only."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        return run(None)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("loss {task.fields[loss]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("reading", total=1.0, loss="")
+        return run(lambda p: bar.update(task, description=p.stage, completed=p.fraction, loss=f"{p.loss:.6g}"))

@@ -1,0 +1,78 @@
+"""`brdf serve`: starts the HTTP service."""
+
+import contextlib
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+
+def command(
+    host: Annotated[str | None, typer.Option(help="Address to listen on; by default this machine only.")] = None,
+    port: Annotated[int | None, typer.Option(help="Port to listen on; by default 8000.")] = None,
+    data: Annotated[Path | None, typer.Option(help="Folder of datasets, jobs and results.")] = None,
+) -> None:
+    """Start the service; print its address and where its data lives, and run until interrupted."""
+    import uvicorn
+
+    from service.app import create_app
+    from service.settings import Settings
+
+    settings = Settings.from_environment(host=host, port=port, data=data)
+    with _bound(settings) as listener:
+        typer.echo(f"Service: {_url(listener)}  (its documentation: {_url(listener)}/docs)")
+        typer.echo(f"Data:    {settings.data.resolve()}")
+        if not settings.host.startswith("127.") and settings.host not in ("localhost", "::1"):
+            typer.echo("Open to other machines: anyone who reaches this address can use the service.", err=True)
+        uvicorn.Server(uvicorn.Config(create_app(settings), log_level="warning")).run(sockets=[listener])
+
+
+@contextlib.contextmanager
+def background(settings: "Settings") -> Iterator[str]:
+    """The URL of a service that runs in this process, in a thread, until the block ends."""
+    import uvicorn
+
+    from service.app import create_app
+
+    with _bound(settings) as listener:
+        server = uvicorn.Server(uvicorn.Config(create_app(settings), log_level="warning"))
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="brdf-service")
+        thread.start()
+        try:
+            while not server.started and thread.is_alive():
+                time.sleep(0.01)
+            yield _url(listener)
+        finally:
+            server.should_exit = True
+            thread.join()
+
+
+@contextlib.contextmanager
+def _bound(settings: "Settings") -> Iterator[socket.socket]:
+    """A socket that is bound before anything is started, so that a port in use is one sentence."""
+    from ..errors import InvalidValueError
+
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((settings.host, settings.port))
+        except OSError as error:
+            raise InvalidValueError(
+                f"Expected {settings.host}:{settings.port} to be free to listen on, got: {error.strerror}. "
+                "Choose another with --port.",
+                field="port",
+            ) from error
+        yield listener
+
+
+def _url(listener: socket.socket) -> str:
+    host, port = listener.getsockname()[:2]
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"

@@ -1,0 +1,24 @@
+"""Fixtures that every test may use."""
+
+import os
+import pathlib
+
+import pytest
+import torch
+
+
+@pytest.fixture(scope="session")
+def measured() -> pathlib.Path:
+    """The folder of real measurements that BRDF_MEASURED names; without it the test is skipped, except under CI."""
+    folder = os.environ.get("BRDF_MEASURED")
+    if folder and pathlib.Path(folder).is_dir():
+        return pathlib.Path(folder)
+    if os.environ.get("CI") == "true":
+        pytest.fail("BRDF_MEASURED must name the folder of measurements when CI=true")
+    pytest.skip("needs real measurements: set BRDF_MEASURED to their folder")
+
+
+@pytest.fixture
+def generator() -> torch.Generator:
+    """A seeded source of random numbers."""
+    return torch.Generator().manual_seed(20100629)
