@@ -57,5 +57,5 @@ def unknown_name(kind: str, name: str, known: Iterable[str], *, field: str | Non
     names = list(known)
     nearest = difflib.get_close_matches(name, names, n=1)
     hint = f"Did you mean {nearest[0]!r}? " if nearest else ""
-    listed = ", ".join(names)
-    return UnknownNameError(f"Expected {kind} to be a known name, got {name!r}. {hint}Known: {listed}.", field=field)
+    listed = f"Known: {', '.join(names)}." if names else "There are none; leave it out."
+    return UnknownNameError(f"Expected {kind} to be a known name, got {name!r}. {hint}{listed}", field=field)

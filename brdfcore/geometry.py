@@ -4,14 +4,18 @@
 
 Everything follows from the half vector's slopes, so no angle is computed and nothing is lost near the normal or at
 the horizon (tests/test_geometry.py). Inputs are made safe here once: a pair with a direction at or below the horizon
-is evaluated at the normal and masked afterwards, and a cosine below `FLOOR` is evaluated there. That floor (9e-13 in
-float32, 4e-121 in float64) keeps every model's value finite in its whole box; it lies far under the rounding of a
-unit vector's components.
+is evaluated at the normal and masked afterwards, and a cosine below `FLOOR` is evaluated there. That floor (9e-13 for
+float32, 7e-49 for float64) keeps what models divide by, and the gradients, within the type; it lies far under the
+rounding of a unit vector's components.
+
+For float32 directions these few additions and divisions are done in float64 and rounded once, and what models would
+divide by comes as a reciprocal, whose own derivative is then float64's affair. So a partial derivative of a model never
+exceeds twice its value, and no overflow meets a factor that is exactly 0 and makes a NaN.
 """
 
 from collections.abc import Iterable
 from functools import cached_property
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import torch
 from torch import Tensor
@@ -19,7 +23,7 @@ from torch import Tensor
 from ._types import Directions, Mask, Quantity
 from .errors import InvalidValueError
 
-FLOOR = {torch.float32: 2.0**-40, torch.float64: 2.0**-400}
+FLOOR = {torch.float32: 2.0**-40, torch.float64: 2.0**-160}
 
 _NOT_ASKED_FOR = cast(Tensor, None)  # arithmetic with a quantity that `needs` does not name fails at once
 
@@ -30,11 +34,14 @@ class Geometry(NamedTuple):
     above: Mask  # both directions above the horizon
     ci: Quantity = _NOT_ASKED_FOR  # cos theta_i
     co: Quantity = _NOT_ASKED_FOR  # cos theta_o
-    hz: Quantity = _NOT_ASKED_FOR  # ci + co, the height of the unnormalised half vector
+    over_ci: Quantity = _NOT_ASKED_FOR  # 1 / cos theta_i; models multiply by reciprocals, see above
+    over_co: Quantity = _NOT_ASKED_FOR  # 1 / cos theta_o
+    over_hz: Quantity = _NOT_ASKED_FOR  # 1 / (ci + co), over the height of the unnormalised half vector
     p: Quantity = _NOT_ASKED_FOR  # slope of the half vector along x
     q: Quantity = _NOT_ASKED_FOR  # slope of the half vector along y
     e2: Quantity = _NOT_ASKED_FOR  # p^2 + q^2
     h_dot_wo: Quantity = _NOT_ASKED_FOR  # cosine between half vector and either direction
+    over_h_dot_wo: Quantity = _NOT_ASKED_FOR  # its reciprocal
 
     def detach(self) -> "Geometry":
         """The same quantities without their history, to be kept."""
@@ -44,15 +51,42 @@ class Geometry(NamedTuple):
 QUANTITIES = frozenset(Geometry._fields) - {"above"}
 
 
-class _OnDemand:
-    """Computes each quantity of a pair of directions at most once."""
+class _ToSingle(torch.autograd.Function):
+    """The float32 of a float64 tensor; a gradient that overflowed comes back as the largest float32."""
 
-    def __init__(self, wi: Tensor, wo: Tensor) -> None:
+    generate_vmap_rule = True
+
+    @staticmethod
+    def forward(x: Tensor) -> Tensor:
+        return x.to(torch.float32)
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Tensor], output: Tensor) -> None:
+        """Keep nothing: neither derivative depends on the input."""
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> Tensor:
+        largest = torch.finfo(torch.float32).max
+        return gradient.clamp(-largest, largest).to(torch.float64)
+
+    @staticmethod
+    def jvp(ctx: Any, tangent: Tensor) -> Tensor:
+        return tangent.to(torch.float32)
+
+
+def _to_single(x: Tensor) -> Tensor:
+    return cast(Tensor, _ToSingle.apply(x))  # type: ignore[no-untyped-call]
+
+
+class _OnDemand:
+    """Computes each quantity of a pair of float64 directions at most once."""
+
+    def __init__(self, wi: Tensor, wo: Tensor, floor: float) -> None:
         self.above = (wi[..., 2:] > 0) & (wo[..., 2:] > 0)
-        normal = torch.tensor([0.0, 0.0, 1.0], dtype=wi.dtype, device=wi.device)
+        normal = wi.new_tensor([0.0, 0.0, 1.0])
         self.wi = torch.where(self.above, wi, normal)
         self.wo = torch.where(self.above, wo, normal)
-        self.floor = FLOOR[wi.dtype]
+        self.floor = floor
 
     @cached_property
     def ci(self) -> Tensor:
@@ -65,6 +99,22 @@ class _OnDemand:
     @cached_property
     def hz(self) -> Tensor:
         return self.ci + self.co
+
+    @cached_property
+    def over_ci(self) -> Tensor:
+        return self.ci.reciprocal()
+
+    @cached_property
+    def over_co(self) -> Tensor:
+        return self.co.reciprocal()
+
+    @cached_property
+    def over_hz(self) -> Tensor:
+        return self.hz.reciprocal()
+
+    @cached_property
+    def over_h_dot_wo(self) -> Tensor:
+        return self.h_dot_wo.reciprocal()
 
     @cached_property
     def hx(self) -> Tensor:
@@ -93,22 +143,33 @@ class _OnDemand:
 
 def geometry(wi: Directions, wo: Directions, needs: Iterable[str]) -> Geometry:
     """The quantities that `needs` names, for directions of one floating dtype; raises for other dtypes and shapes."""
-    for name, w in (("wi", wi), ("wo", wo)):
-        if w.ndim == 0 or w.shape[-1] != 3:
-            raise InvalidValueError(
-                f"Expected {name} to be unit vectors on a last axis of length 3, got shape {tuple(w.shape)}. "
-                "Pass directions as (..., 3).",
-                field=name,
-            )
-        if w.dtype not in FLOOR:
-            raise InvalidValueError(
-                f"Expected {name} to be float32 or float64, got {w.dtype}. Convert it with {name}.float().", field=name
-            )
-    if wi.dtype != wo.dtype:
-        dtype = torch.promote_types(wi.dtype, wo.dtype)
-        wi, wo = wi.to(dtype), wo.to(dtype)
-    on_demand = _OnDemand(wi, wo)
-    return Geometry(above=on_demand.above, **{name: getattr(on_demand, name) for name in needs})
+    check_directions("wi", wi)
+    check_directions("wo", wo)
+    dtype = torch.promote_types(wi.dtype, wo.dtype)
+    on_demand = _OnDemand(wi.double(), wo.double(), FLOOR[dtype])
+    quantities = {name: getattr(on_demand, name) for name in needs}
+    if dtype == torch.float32:
+        quantities = {name: _to_single(quantity) for name, quantity in quantities.items()}
+    return Geometry(above=on_demand.above, **quantities)
+
+
+def check_directions(name: str, w: Tensor) -> None:
+    """Raise InvalidValueError where w is no float32 or float64 tensor of shape (..., 3)."""
+    if not isinstance(w, Tensor):
+        raise InvalidValueError(
+            f"Expected {name} to be a tensor, got {type(w).__name__}. Convert it with torch.as_tensor({name}).",
+            field=name,
+        )
+    if w.ndim == 0 or w.shape[-1] != 3:
+        raise InvalidValueError(
+            f"Expected {name} to be unit vectors on a last axis of length 3, got shape {tuple(w.shape)}. "
+            "Pass directions as (..., 3).",
+            field=name,
+        )
+    if w.dtype not in FLOOR:
+        raise InvalidValueError(
+            f"Expected {name} to be float32 or float64, got {w.dtype}. Convert it with {name}.float().", field=name
+        )
 
 
 def from_angles(theta: Tensor, phi: Tensor) -> Directions:

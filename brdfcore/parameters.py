@@ -51,13 +51,17 @@ class Parameter:
         below = value < self.high if self.open_high else value <= self.high
         return above & below
 
-    def check(self, key: str, value: Tensor) -> None:
-        """Raise where a value is outside the box, or has a shape that this parameter cannot have."""
-        if value.ndim > 1 or (value.ndim == 1 and self.per_channel == "no"):
+    def check_shape(self, key: str, value: Tensor) -> None:
+        """Raise where a value has a shape that this parameter cannot have."""
+        if value.ndim > 1 or (value.ndim == 1 and (self.per_channel == "no" or not value.numel())):
             shape = "one number" if self.per_channel == "no" else "one number or one a channel"
             raise ParameterError(
                 f"Expected {key} to be {shape}, got {value.tolist()}. Give {self.name} as such.", field=key
             )
+
+    def check(self, key: str, value: Tensor) -> None:
+        """Raise where a value is outside the box, or has a shape that this parameter cannot have."""
+        self.check_shape(key, value)
         inside = self.contains(value)
         if not bool(inside.all()):
             bad = value if value.ndim == 0 else value[~inside][0]
@@ -68,8 +72,9 @@ class Parameter:
             )
 
     def to_raw(self, value: Tensor) -> Tensor:
-        """The stored form of a value."""
-        return torch.log(value) if self.scale == "log" else value
+        """The stored form of a value, on the raw ends where the value lies on an end of the box."""
+        raw = torch.log(value) if self.scale == "log" else value
+        return raw.clamp(*self.raw_ends(raw.dtype))
 
     def from_raw(self, raw: Tensor) -> Tensor:
         """The value of a stored form, clamped to the box; on an end of it the gradient still passes."""
@@ -89,7 +94,8 @@ class Parameter:
 @functools.cache
 def _raw_ends(parameter: Parameter, dtype: torch.dtype) -> tuple[float, float]:
     def innermost(end: float, inwards: float) -> float:
-        raw = parameter.to_raw(torch.tensor(end, dtype=dtype))
+        raw = torch.tensor(end, dtype=dtype)
+        raw = torch.log(raw) if parameter.scale == "log" else raw
         towards = torch.tensor(inwards, dtype=dtype)
         while not bool(parameter.contains(torch.exp(raw) if parameter.scale == "log" else raw)):
             raw = torch.nextafter(raw, towards)

@@ -5,6 +5,10 @@ import pathlib
 
 import pytest
 import torch
+from jaxtyping import install_import_hook
+
+# the shapes that annotations state are checked while tests run; to be installed before the modules are loaded
+install_import_hook(["brdfcore.geometry", "brdfcore.models", "brdfcore.parameters"], "beartype.beartype")
 
 
 @pytest.fixture(scope="session")

@@ -86,10 +86,8 @@ class Problem:
         ends: list[list[Tensor]] = [[], []]
         for key in self.keys:
             parameter = form.parameters[key]
-            for side, numbers in zip(ends, form.bounds(key), strict=True):
-                raw = parameter.to_raw(torch.tensor(numbers, dtype=torch.float64))
-                raw = raw.clamp(*parameter.raw_ends(torch.float64))  # beyond them no gradient passes
-                side.append(raw.expand(self.plan.start[key].numel()))
+            for side, natural in zip(ends, form.bounds(key, self.plan.start[key]), strict=True):
+                side.append(parameter.to_raw(natural).reshape(-1))
         empty = torch.zeros(0, dtype=torch.float64)
         return (torch.cat(ends[0]), torch.cat(ends[1])) if self.keys else (empty, empty)
 

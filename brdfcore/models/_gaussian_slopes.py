@@ -49,14 +49,14 @@ class GaussianSlopes(HalfVectorLobe):
     @property
     def pdf_needs(self) -> frozenset[str]:
         """The quantities of the geometry that the density reads."""
-        return self.slope_needs | {"e2", "h_dot_wo"}
+        return self.slope_needs | {"e2", "over_h_dot_wo"}
 
     def exponent(self, values: Values, g: Geometry) -> Tensor:
         """Q = p^2/ax^2 + q^2/ay^2 [1], (..., 1), so that E = exp(-Q)."""
         wx, wy = self.widths(values)
         if self.anisotropic:
             return (g.p / wx).square() + (g.q / wy).square()
-        return g.e2 / wx.square()
+        return g.e2 / wx / wx  # not by the square: its gradient would overflow in float32
 
     def slopes(self, values: Values, u: Tensor) -> tuple[Tensor, Tensor]:
         """Gaussian slopes p, q (..., 1)."""

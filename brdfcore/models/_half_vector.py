@@ -55,4 +55,4 @@ class HalfVectorLobe(Model):
 
     def pdf(self, values: Values, g: Geometry) -> Tensor:
         """p_h / (4 h.wo) [1/sr] (Walter 2005 eq. 8, Ashikhmin and Shirley techreport eq. 20)."""
-        return self.half_vector_density(values, g) / (4 * g.h_dot_wo)
+        return 0.25 * self.half_vector_density(values, g) * g.over_h_dot_wo

@@ -16,19 +16,26 @@ class KurtFamily(FresnelLobe, GaussianSlopes):
     """A Gaussian-slope microfacet lobe under a Fresnel factor."""
 
     widths_along = ("m", "mx", "my")
-    lobe_needs = ("ci", "co")
+    lobe_needs = ("over_ci", "over_co")
 
     @property
     def needs(self) -> frozenset[str]:
         """The quantities of the geometry that the lobe reads."""
-        return self.slope_needs | {"e2", "h_dot_wo", *self.lobe_needs}
+        return self.slope_needs | {"e2", "over_h_dot_wo", *self.lobe_needs, *({"h_dot_wo"} if self.fresnel else ())}
 
     @abstractmethod
-    def shadowing(self, values: Values, g: Geometry) -> Tensor:
-        """What divides the lobe beside 4 h.wo [1], (..., 1)."""
+    def over_shadowing(self, values: Values, g: Geometry) -> Tensor:
+        """What multiplies D / (4 h.wo) [1], (..., 1)."""
 
     def lobe(self, values: Values, g: Geometry) -> Tensor:
         """The lobe for ks F = 1 [1/sr], (..., 1)."""
         mx, my = self.widths(values)
         root = torch.exp(-0.5 * self.exponent(values, g)) * (1 + g.e2)  # squared only here: (1 + e2)^2 could overflow
-        return root.square() / (math.pi * mx * my) / (4 * g.h_dot_wo) / self.shadowing(values, g)
+        lobe = root.square() / (4 * math.pi * mx * my) * g.over_h_dot_wo
+        over = self.over_shadowing(values, g)
+        # The product alone can overflow, in float32 at grazing angles. Near that it has no gradient, since sums of
+        # overflowing derivatives would be NaN, and it stops at the largest number.
+        largest = torch.finfo(lobe.dtype).max
+        limit = 2.0**-20 * largest / lobe.detach()
+        beyond = (lobe.detach() * over.detach()).clamp(max=largest)
+        return torch.where(over < limit, lobe * torch.minimum(over, limit), beyond)

@@ -3,7 +3,6 @@
 import math
 from abc import abstractmethod
 
-import torch
 from torch import Tensor
 
 from ..geometry import Geometry
@@ -21,10 +20,10 @@ class WardFamily(ScaledLobe, GaussianSlopes):
         return self.slope_needs | set(self.lobe_needs)
 
     @abstractmethod
-    def factor(self, g: Geometry, e: Tensor) -> Tensor:
-        """E times what tells the family's members apart [1], (..., 1)."""
+    def factor(self, g: Geometry, exponent: Tensor) -> Tensor:
+        """E = exp(-exponent) times what tells the family's members apart [1], (..., 1)."""
 
     def lobe(self, values: Values, g: Geometry) -> Tensor:
         """The lobe for rs = 1 [1/sr], (..., 1)."""
         wx, wy = self.widths(values)
-        return self.factor(g, torch.exp(-self.exponent(values, g))) / (math.pi * wx * wy)
+        return self.factor(g, self.exponent(values, g)) / (math.pi * wx * wy)

@@ -23,13 +23,13 @@ from ._fresnel_lobe import F0, FresnelLobe
 from ._half_vector import ISOTROPY
 
 
-def _log1p_ratio(e2: Tensor) -> Tensor:
-    """log(1 + e2) / e2 [1], by its series where e2 is below 1e-3 (next term 1e-21)."""
+def _times_log1p_ratio(x: Tensor, e2: Tensor) -> Tensor:
+    """The product x log(1 + e2) / e2 for x of e2's order, the logarithm by its series below 1e-3 (next term 1e-21)."""
     small = e2 < 1e-3
+    y = torch.where(small, e2, 0.0)
+    series = 1 - y * (1 / 2 - y * (1 / 3 - y * (1 / 4 - y * (1 / 5 - y * (1 / 6 - y / 7)))))
     safe = torch.where(small, 1.0, e2)
-    x = torch.where(small, e2, 0.0)
-    series = 1 - x * (1 / 2 - x * (1 / 3 - x * (1 / 4 - x * (1 / 5 - x * (1 / 6 - x / 7)))))
-    return torch.where(small, series, torch.log1p(safe) / safe)
+    return torch.where(small, x * series, (x / safe) * torch.log1p(safe))  # 1/e2^2 would underflow in float32
 
 
 class AshikhminShirley(FresnelLobe):
@@ -38,8 +38,7 @@ class AshikhminShirley(FresnelLobe):
     name = "ashikhmin_shirley"
     option_groups = (ISOTROPY, ("schlick", "scaled", "constant"))
     widths_along = ("n", "nu", "nv")
-    lobe_needs = ("ci", "co", "e2", "h_dot_wo")
-    pdf_lobe_needs = ("e2", "h_dot_wo")
+    lobe_needs = ("over_ci", "over_co", "e2", "over_h_dot_wo")
 
     @property
     def reflectances(self) -> tuple[Parameter, ...]:
@@ -63,12 +62,17 @@ class AshikhminShirley(FresnelLobe):
     @property
     def needs(self) -> frozenset[str]:
         """The quantities of the geometry that the lobe reads."""
-        return frozenset({*self.lobe_needs, *({"p", "q"} if self.anisotropic else ())})
+        return frozenset(self.lobe_needs) | self.slope_needs | ({"h_dot_wo"} if self.fresnel else set())
+
+    @property
+    def slope_needs(self) -> frozenset[str]:
+        """The quantities that `height` reads beside e2."""
+        return frozenset({"p", "q"} if self.anisotropic else ())
 
     @property
     def pdf_needs(self) -> frozenset[str]:
         """The quantities of the geometry that the density reads."""
-        return frozenset({*self.pdf_lobe_needs, *({"p", "q"} if self.anisotropic else ())})
+        return self.slope_needs | {"e2", "over_h_dot_wo"}
 
     def coefficients(self, values: Values) -> tuple[Tensor, ...]:
         """The products ks f0 and ks (1 - f0), with ks = 1 in the paper's own form, or ks alone."""
@@ -81,12 +85,12 @@ class AshikhminShirley(FresnelLobe):
         nu, nv = self.widths(values)
         if self.anisotropic:
             norm = torch.sqrt((nu + 1) * (nv + 1))
-            return norm * torch.exp(-0.5 * (nu * g.p.square() + nv * g.q.square()) * _log1p_ratio(g.e2))
+            return norm * torch.exp(-0.5 * _times_log1p_ratio(nu * g.p.square() + nv * g.q.square(), g.e2))
         return (nu + 1) * torch.exp(-0.5 * nu * torch.log1p(g.e2))
 
     def lobe(self, values: Values, g: Geometry) -> Tensor:
         """The lobe for ks F = 1 [1/sr], (..., 1)."""
-        return self.height(values, g) / (8 * math.pi * g.h_dot_wo) / torch.maximum(g.ci, g.co)
+        return self.height(values, g) / (8 * math.pi) * g.over_h_dot_wo * torch.minimum(g.over_ci, g.over_co)
 
     def slopes(self, values: Values, u: Tensor) -> tuple[Tensor, Tensor]:
         """Slopes p, q (..., 1): the azimuth from the first number of u, the height from the second (eqs. 21, 22)."""

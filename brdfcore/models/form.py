@@ -52,9 +52,10 @@ class Form:
                 f"Expected {key} to be tied to another parameter, got itself. Name the owner.", field=key
             )
         if tie.owner in self.ties:
+            further = self.ties[tie.owner].owner
+            advice = f"Tie {key} to {further}." if further != key else f"Give {key} or {tie.owner} a value."
             raise ModelTextError(
-                f"Expected {key} to be tied to a free parameter, got {tie.owner}, which is tied itself. "
-                f"Tie {key} to {self.ties[tie.owner].owner}.",
+                f"Expected {key} to be tied to a free parameter, got {tie.owner}, which is tied itself. {advice}",
                 field=key,
             )
         if tie.owner not in self.parameters:
@@ -105,27 +106,23 @@ class Form:
         """The values of one term, by the names that its model knows."""
         return {name: self.resolve(f"{term.label}.{name}", values) for name in term.model.parameter}
 
-    def bounds(self, key: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The smallest and largest values of a free parameter, one number or one a channel.
+    def bounds(self, key: str, like: Tensor) -> tuple[Tensor, Tensor]:
+        """The smallest and largest values of a free parameter, shaped and typed as `like`, () or (C,).
 
         They are the ends of its box, narrowed where a parameter that is tied to it would leave its own.
         """
-        low, high = self.parameters[key].ends(torch.float64)
-        lows: tuple[float, ...] = (low,)
-        highs: tuple[float, ...] = (high,)
+        low, high = (torch.full_like(like, end) for end in self.parameters[key].ends(like.dtype))
         for tied, tie in self.ties.items():
-            if tie.owner != key:
-                continue
-            tied_low, tied_high = self.all_parameters[tied].ends(torch.float64)
-            totals = tie.total
-            if totals is None:
-                lows, highs = tuple(max(x, tied_low) for x in lows), tuple(min(x, tied_high) for x in highs)
-            else:
-                lows, highs = _widen(lows, len(totals)), _widen(highs, len(totals))
-                totals = _widen(totals, len(lows))
-                lows = tuple(max(x, t - tied_high) for x, t in zip(lows, totals, strict=True))
-                highs = tuple(min(x, t - tied_low) for x, t in zip(highs, totals, strict=True))
-        return lows, highs
+            if tie.owner == key:
+                tied_low, tied_high = self.all_parameters[tied].ends(like.dtype)
+                if tie.total is None:
+                    low, high = low.clamp(min=tied_low), high.clamp(max=tied_high)
+                else:  # the owner lies in total - [tied_low, tied_high], for every channel where it is gray
+                    totals = like.new_tensor(tie.total)
+                    totals = totals if like.ndim else torch.stack([totals.max(), totals.min()])
+                    above, below = (totals, totals) if like.ndim else totals.unbind()
+                    low, high = torch.maximum(low, above - tied_high), torch.minimum(high, below - tied_low)
+        return low, high
 
     def f(self, values: Values, g: Geometry) -> Spectrum:
         """The BRDF [1/sr], (..., C), or (..., 1) where all coefficients are gray; exactly 0 below the horizon."""
@@ -138,8 +135,7 @@ class Form:
         if len(bases) == 1:
             total = bases[0] * coefficients[0]
         else:
-            basis = torch.cat(torch.broadcast_tensors(*bases), dim=-1)
-            total = basis @ torch.stack(torch.broadcast_tensors(*coefficients))
+            total = _columns(bases) @ torch.stack(torch.broadcast_tensors(*coefficients))
         return torch.where(g.above, total, 0.0)
 
     def shares(self, values: Values) -> Tensor:
@@ -156,7 +152,7 @@ class Form:
     def pdf(self, values: Values, g: Geometry) -> Density:
         """The density of `sample` per solid angle [1/sr], (...); its integral falls short of 1 by what is lost."""
         densities = [term.model.pdf(self.of_term(term, values), g) for term in self.terms]
-        total = torch.cat(torch.broadcast_tensors(*densities), dim=-1) @ self.shares(values)
+        total = _columns(densities) @ self.shares(values)
         return torch.where(g.above.squeeze(-1), total, 0.0)
 
     def sample(self, values: Values, wo: Directions, u: Directions) -> Directions:
@@ -203,8 +199,9 @@ class Form:
         ]
 
 
-def _widen(numbers: tuple[float, ...], count: int) -> tuple[float, ...]:
-    return numbers * count if len(numbers) == 1 else numbers
+def _columns(parts: Sequence[Tensor]) -> Tensor:
+    """Parts (..., 1) side by side, (..., K)."""
+    return torch.cat(torch.broadcast_tensors(*parts), dim=-1)
 
 
 def _scalar(numbers: tuple[float, ...]) -> tuple[float, ...] | float:

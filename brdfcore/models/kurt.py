@@ -24,6 +24,6 @@ class Kurt(KurtFamily):
     name = "kurt"
     shape = (Parameter("alpha", 0.1, 0.0, 1.0, "shadowing exponent [1]", search=(0.0, 0.5)),)
 
-    def shadowing(self, values: Values, g: Geometry) -> Tensor:
-        """(ci co)^alpha [1], (..., 1)."""
-        return (g.ci * g.co) ** values["alpha"]
+    def over_shadowing(self, values: Values, g: Geometry) -> Tensor:
+        """(ci co)^-alpha [1], (..., 1)."""
+        return (g.over_ci * g.over_co) ** values["alpha"]

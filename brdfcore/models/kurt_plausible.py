@@ -22,6 +22,6 @@ class KurtPlausible(KurtFamily):
 
     name = "kurt_plausible"
 
-    def shadowing(self, values: Values, g: Geometry) -> Tensor:
-        """max(ci, co) [1], (..., 1)."""
-        return torch.maximum(g.ci, g.co)
+    def over_shadowing(self, values: Values, g: Geometry) -> Tensor:
+        """1 / max(ci, co) [1], (..., 1)."""
+        return torch.minimum(g.over_ci, g.over_co)

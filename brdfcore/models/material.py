@@ -2,17 +2,16 @@
 
 import functools
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import torch
 from torch import Tensor, nn
 
 from .._types import Density, Directions, Spectrum
-from ..errors import ModelTextError, ParameterError, unknown_name
-from ..geometry import geometry
-from . import MODELS
-from .form import Form, Term, build
-from .text import Tie, parse
+from ..errors import InvalidValueError, ModelTextError, ParameterError, unknown_name
+from ..geometry import check_directions, geometry
+from .form import Form, build
+from .text import ParsedTerm, Tie, parse
 
 Number = float | Sequence[float] | Tensor
 
@@ -69,26 +68,32 @@ class Material(nn.Module):
     def _check_ties(self) -> None:
         values = self.values()
         for key, tie in self.form.ties.items():
+            parameter = self.form.all_parameters[key]
             value = self.form.resolve(key, values).detach()
-            if not bool(self.form.all_parameters[key].contains(value).all()):
+            parameter.check_shape(key, value)
+            if not bool(parameter.contains(value).all()):
                 raise ParameterError(
-                    f"Expected {key} to be in {self.form.all_parameters[key].box}, got "
-                    f"{float(value.min()):.12g} from its tie to {tie.owner}. Change the owner's value or the total.",
+                    f"Expected {key} to be in {parameter.box}, got {float(value.min()):.12g} from its tie to "
+                    f"{tie.owner}. Change the owner's value or the total.",
                     field=key,
                 )
 
     def _raw_values(self) -> dict[str, Tensor]:
-        return {key: self.get_parameter(f"raw.{key}") for key in self.form.parameters}
+        found: dict[str, Tensor] = {}
+        for key in self.form.parameters:
+            label, name = key.split(".")
+            found[key] = cast(nn.ParameterDict, self.raw[label])[name]  # a plain tensor under functional_call
+        return found
 
     def values(self) -> dict[str, Tensor]:
         """The natural values by key, () or (C,), differentiable."""
         return {key: self.form.parameters[key].from_raw(raw) for key, raw in self._raw_values().items()}
 
     def project_(self) -> "Material":
-        """Put every stored value back into its box, in place; for use after an optimiser's step."""
+        """Put every stored value back into its box, in place, as far as its ties allow; call it after each step."""
         with torch.no_grad():
             for key, raw in self._raw_values().items():
-                raw.copy_(self.form.parameters[key].to_raw(self.form.parameters[key].from_raw(raw)))
+                raw.clamp_(*(self.form.parameters[key].to_raw(end) for end in self.form.bounds(key, raw)))
         return self
 
     def _values_like(self, *directions: Tensor) -> dict[str, Tensor]:
@@ -111,7 +116,14 @@ class Material(nn.Module):
 
         A wi may lie below the horizon: its weight is 0 and it must not be drawn again.
         """
-        return self.form.sample(self._values_like(wo), wo, u.to(wo))
+        check_directions("wo", wo)
+        if u.ndim == 0 or u.shape[-1] != 3:
+            raise InvalidValueError(
+                f"Expected u to be three numbers on the last axis, got shape {tuple(u.shape)}. Pass u as (..., 3).",
+                field="u",
+            )
+        u = u.to(wo).clamp(max=1 - torch.finfo(wo.dtype).eps / 2)  # rounding to float32 may reach 1
+        return self.form.sample(self._values_like(wo), wo, u)
 
     def weight(self, wi: Directions, wo: Directions) -> Spectrum:
         """The quotient f cos theta_i / pdf [1], (..., C), which a sample contributes; 0 where the density is."""
@@ -134,26 +146,49 @@ class Material(nn.Module):
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "Material":
         """The material that `to_json` wrote; raises where the data is none."""
-        try:
-            terms = tuple(
-                Term(
-                    entry["label"],
-                    MODELS[entry["model"]](entry["options"]),
-                    tuple(
-                        (name, Tie(tie["owner"], None if tie["total"] is None else tuple(tie["total"])))
-                        for name, tie in entry["ties"].items()
-                    ),
-                )
-                for entry in data["terms"]
-            )
-            values = data["values"]
-        except (KeyError, TypeError, AttributeError) as error:
-            raise ModelTextError(
-                f"Expected a material's JSON with terms and values, got something without {error}. "
-                "Pass what Material.to_json returned.",
-                field="model",
-            ) from error
-        return cls(Form(terms), values)
+        match data:
+            case {"terms": [_, *_] as entries, "values": dict() as values}:
+                pass
+            case dict():
+                missing = next((part for part in ("terms", "values") if part not in data), "a term")
+                raise _no_material(f"something without {missing!r}")
+            case _:
+                raise _no_material(repr(data))
+        form, _, _ = build([_term(entry) for entry in entries])
+        for term, entry in zip(form.terms, entries, strict=True):
+            if term.label != entry["label"]:
+                raise _no_material(f"the label {entry['label']!r} where {term.label!r} is due")
+        for key, value in values.items():
+            numbers = value if isinstance(value, list) else [value]
+            if not all(isinstance(x, int | float) and not isinstance(x, bool) for x in numbers):
+                raise _no_material(f"{key} = {value!r}")
+        return cls(form, values)
+
+
+def _no_material(got: str) -> ModelTextError:
+    return ModelTextError(
+        f"Expected a material's JSON with terms and values, got {got}. Pass what Material.to_json returned.",
+        field="model",
+    )
+
+
+def _term(entry: object) -> ParsedTerm:
+    """The term of one entry of a material's JSON."""
+    match entry:
+        case {"label": str(), "model": str(model), "options": [*options], "ties": dict() as ties}:
+            if all(isinstance(word, str) for word in options):
+                return ParsedTerm(model, tuple(options), {name: _tie(tie) for name, tie in ties.items()})
+    raise _no_material(f"the term {entry!r}")
+
+
+def _tie(tie: object) -> Tie:
+    """The tie of one entry of a material's JSON."""
+    match tie:
+        case {"owner": str(owner), "total": None}:
+            return Tie(owner)
+        case {"owner": str(owner), "total": [_, *_] as total} if all(isinstance(x, int | float) for x in total):
+            return Tie(owner, tuple(float(x) for x in total))
+    raise _no_material(f"the tie {tie!r}")
 
 
 def material(text: str) -> Material:

@@ -50,8 +50,8 @@ class _Reader:
         self.at = 0
 
     def fail(self, expected: str) -> ModelTextError:
-        rest = self.text[self.at :].strip()
-        got = f"{rest[:20]!r} at character {self.at + 1}" if rest else "the end of the text"
+        rest = self.text[self.at :].lstrip()
+        got = f"{rest.rstrip()[:20]!r} at character {len(self.text) - len(rest) + 1}" if rest else "the end of the text"
         return ModelTextError(
             f"Expected {expected} in the model {self.text!r}, got {got}. "
             "Write it like 'lambert(kd=0.2) + ward_bounded(isotropic, rs=0.05, a=0.03)'.",

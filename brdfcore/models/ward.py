@@ -19,8 +19,8 @@ class Ward(WardFamily):
     """Ward's original normalisation."""
 
     name = "ward"
-    lobe_needs = ("ci", "co")
+    lobe_needs = ("over_ci", "over_co")
 
-    def factor(self, g: Geometry, e: Tensor) -> Tensor:
+    def factor(self, g: Geometry, exponent: Tensor) -> Tensor:
         """E / (4 sqrt(ci co)) [1], (..., 1)."""
-        return e / (4 * torch.sqrt(g.ci) * torch.sqrt(g.co))
+        return 0.25 * torch.exp(-exponent) * (torch.sqrt(g.over_ci) * torch.sqrt(g.over_co))

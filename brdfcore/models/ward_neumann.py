@@ -18,8 +18,8 @@ class WardNeumann(WardFamily):
     """Ward's lobe with an albedo below rs."""
 
     name = "ward_neumann"
-    lobe_needs = ("ci", "co")
+    lobe_needs = ("over_ci", "over_co")
 
-    def factor(self, g: Geometry, e: Tensor) -> Tensor:
+    def factor(self, g: Geometry, exponent: Tensor) -> Tensor:
         """E / (4 max(ci, co)) [1], (..., 1)."""
-        return e / (4 * torch.maximum(g.ci, g.co))
+        return 0.25 * torch.exp(-exponent) * torch.minimum(g.over_ci, g.over_co)

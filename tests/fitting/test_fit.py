@@ -5,12 +5,17 @@ import math
 
 import pytest
 import torch
+from fit_cases import TRUE, directions, measured_from
 
 import brdfcore as bc
 from brdfcore.errors import BrdfError
-from tests.fitting.conftest import TRUE, directions, measured_from
 
 MODEL = "lambert + ward_bounded(isotropic)"
+
+
+@pytest.fixture(scope="module")
+def three_channels() -> bc.Samples:
+    return measured_from(TRUE)
 
 
 @pytest.mark.parametrize("loss", bc.LOSSES)

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 import torch
+from fit_cases import TRUE, measured_from
 
 import brdfcore as bc
 from brdfcore.fitting import errors
 from brdfcore.fitting.losses import LOSSES, Scales
-from tests.fitting.conftest import TRUE, measured_from
 
 
 @pytest.fixture(scope="module")

@@ -2,12 +2,12 @@
 
 import pytest
 import torch
+from fit_cases import measured_from
 
 import brdfcore as bc
 from brdfcore.fitting.losses import LOSSES
 from brdfcore.fitting.plan import plan
 from brdfcore.fitting.problem import Problem
-from tests.fitting.conftest import measured_from
 
 RGB = "lambert(kd=[0.1, 0.2, 0.3]) + ward(rs=[0.05, 0.1, 0.1], a=0.2)"
 CASES = {

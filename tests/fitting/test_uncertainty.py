@@ -7,12 +7,12 @@ import pytest
 import scipy.optimize
 import scipy.stats
 import torch
+from fit_cases import TRUE, measured_from
 
 import brdfcore as bc
 from brdfcore.demo import DATA, MATERIAL, MODEL, linoleum
 from brdfcore.fitting.uncertainty import t_quantile
 from brdfcore.geometry import geometry
-from tests.fitting.conftest import TRUE, measured_from
 
 TABLE_1 = {"ward_bounded.rs": 0.04982, "ward_bounded.a": 0.03172, "lambert.kd": 0.175 - 0.04982}
 

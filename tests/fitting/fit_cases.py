@@ -2,7 +2,6 @@
 
 import math
 
-import pytest
 import torch
 
 import brdfcore as bc
@@ -31,9 +30,3 @@ def measured_from(text: str, count: int = 300, noise: float = 0.0, seed: int = 1
     deviation = torch.full_like(f, noise)
     y = f + deviation / wi[:, 2:] * torch.randn(f.shape, generator=torch.Generator().manual_seed(seed), dtype=f.dtype)
     return bc.Samples(wi, wo, y, sigma=deviation / wi[:, 2:] if sigma else None)
-
-
-@pytest.fixture(scope="session")
-def three_channels() -> bc.Samples:
-    """Noiseless samples of TRUE."""
-    return measured_from(TRUE)

@@ -1,0 +1,167 @@
+"""The command line as it is typed."""
+
+import json
+import pathlib
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import pytest
+
+import brdfcore as bc
+from brdfcore.cli import main
+from brdfcore.demo import DATA, MODEL
+
+BRDF = pathlib.Path(sys.executable).with_name("brdf")
+
+
+@dataclass
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+Run = Callable[..., Done]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: pathlib.Path) -> Run:
+    """Runs a command in this process, in an empty folder, on a terminal of 160 columns."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "160")
+
+    def typed(*arguments: str | pathlib.Path) -> Done:
+        monkeypatch.setattr(sys, "argv", ["brdf", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return Done(int(ended.value.code or 0), *capsys.readouterr())
+
+    return typed
+
+
+def test_fit_prints_the_report_and_writes_the_plot(run: Run, tmp_path: pathlib.Path) -> None:
+    done = run("fit", DATA, "--model", MODEL, "--plot", "lobes.svg")
+    assert done.returncode == 0, done.stderr
+    assert "ward_bounded.rs" in done.stdout
+    assert "95 % interval" in done.stdout
+    assert "Lobe plot: lobes.svg" in done.stdout
+    assert (tmp_path / "lobes.svg").read_text().lstrip().startswith("<?xml")
+
+
+def test_fit_json_is_the_librarys_result(run: Run) -> None:
+    done = run("fit", DATA, "--model", MODEL, "--json", "--seed", "3")
+    theirs, ours = json.loads(done.stdout), bc.fit(bc.read(DATA), MODEL, seed=3).to_dict()
+    for name in ("parameters", "intervals", "standard_errors", "errors", "objective", "provenance", "material"):
+        assert theirs[name] == ours[name]
+
+
+def test_fit_passes_its_options_on(run: Run, tmp_path: pathlib.Path) -> None:
+    rows = "wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,r,g,b\n" + "".join(
+        f"0,0,1,{x},0,{(1 - x * x) ** 0.5:.12f},{0.1 + x},{0.2 + x},{0.3 + x}\n" for x in (0.0, 0.2, 0.4, 0.6)
+    )
+    file = tmp_path / "rows.csv"
+    file.write_text(rows)
+    options = [
+        "--quantity",
+        "reflectance_factor",
+        "--fixed",
+        "kurt.f0=0.2",
+        "--fixed",
+        "kurt.alpha=0",
+        "--gray",
+        "kurt.ks",
+    ]
+    done = run("fit", file, "--model", "lambert + kurt(isotropic)", "--loss", "log", "--json", *options)
+    result = json.loads(done.stdout)
+    assert result["parameters"]["kurt.f0"] == 0.2
+    assert result["loss"] == "log"
+    assert isinstance(result["parameters"]["kurt.ks"], float)
+    assert len(result["parameters"]["lambert.kd"]) == 3
+    assert result["data"]["quantity"] == "reflectance_factor"
+
+
+MISTAKES = {
+    "no file": (("fit", "absent.csv", "--model", "lambert"), "absent.csv"),
+    "unknown model": (("fit", DATA, "--model", "lambrt"), "Did you mean 'lambert'"),
+    "fixed without a number": (("fit", DATA, "--model", "lambert", "--fixed", "lambert.kd"), "KEY=NUMBER"),
+    "plot suffix": (("fit", DATA, "--model", "lambert", "--plot", "x.pdf"), ".svg or .png"),
+    "plot scale": (("fit", DATA, "--model", "lambert", "--plot", "x.svg", "--scale", "cubic"), "a scale"),
+    "undeclared": (("fit", DATA, "--model", "lambert", "--quantity", "brdf_cos"), "quantity"),
+    "models": (("models", "krt"), "Did you mean 'kurt'"),
+    "setting": (("serve", "--port", "99999"), "port"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_a_mistake_is_one_sentence_and_no_traceback(run: Run, case: str) -> None:
+    arguments, part = MISTAKES[case]
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert done.stderr.startswith("brdf: Expected ")
+    assert part in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_models_lists_the_registry(run: Run) -> None:
+    listed = run("models").stdout
+    assert all(name in listed for name in bc.MODELS)
+    one = run("models", "kurt").stdout
+    for part in (
+        "ks F D / (4 (h.wo) (ci co)^alpha)",
+        "Source:",
+        "Departure:",
+        "shadowing exponent",
+        "[0, 1]",
+        "schlick",
+    ):
+        assert part in one
+    described = json.loads(run("models", "--json").stdout)
+    assert [entry["name"] for entry in described] == list(bc.MODELS)
+
+
+def test_help_loads_no_torch() -> None:
+    code = (
+        "import sys; sys.argv = ['brdf', '--help']\n"
+        "from brdfcore.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print('LOADED', sorted({'torch', 'fastapi', 'matplotlib', 'numpy', 'pydantic'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert "LOADED []" in done.stdout, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("command", ["fit", "models", "serve", "demo"])
+def test_every_command_has_help(run: Run, command: str) -> None:
+    assert f"brdf {command}" in run(command, "--help").stdout
+
+
+def test_demo_does_the_whole_job(tmp_path: pathlib.Path) -> None:
+    done = subprocess.run([BRDF, "demo"], capture_output=True, text=True, cwd=tmp_path, timeout=120)
+    assert done.returncode == 0, done.stderr
+    plot = tmp_path / "red_linoleum.svg"
+    assert f"Lobe plot written to {plot}" in done.stdout
+    assert plot.read_text().lstrip().startswith("<?xml")
+    for part in ("Service running at http://127.0.0.1:", "ward_bounded.a", "95 % interval", "errors: cosine"):
+        assert part in done.stdout
+
+
+def test_serve_says_where_it_is_and_ends_on_interrupt(tmp_path: pathlib.Path) -> None:
+    server = subprocess.Popen(
+        [BRDF, "serve", "--port", "0", "--data", tmp_path / "data"], stdout=subprocess.PIPE, text=True
+    )
+    assert server.stdout is not None
+    try:
+        first, second = server.stdout.readline(), server.stdout.readline()
+        assert first.startswith("Service: http://127.0.0.1:")
+        assert str(tmp_path / "data") in second
+    finally:
+        begun = time.monotonic()
+        server.terminate()
+        server.wait(10)
+        server.stdout.close()
+    assert time.monotonic() - begun < 5
