@@ -20,9 +20,7 @@ def command(
     data: Annotated[Path | None, typer.Option(help="Folder of datasets, jobs and results.")] = None,
 ) -> None:
     """Start the service; print its address and where its data lives, and run until interrupted."""
-    import uvicorn
-
-    from service.app import create_app
+    from service.app import server
     from service.settings import Settings
 
     settings = Settings.from_environment(host=host, port=port, data=data)
@@ -31,26 +29,24 @@ def command(
         typer.echo(f"Data:    {settings.data.resolve()}")
         if not settings.host.startswith("127.") and settings.host not in ("localhost", "::1"):
             typer.echo("Open to other machines: anyone who reaches this address can use the service.", err=True)
-        uvicorn.Server(uvicorn.Config(create_app(settings), log_level="warning")).run(sockets=[listener])
+        server(settings).run(sockets=[listener])
 
 
 @contextlib.contextmanager
 def background(settings: "Settings") -> Iterator[str]:
     """The URL of a service that runs in this process, in a thread, until the block ends."""
-    import uvicorn
-
-    from service.app import create_app
+    from service.app import server
 
     with _bound(settings) as listener:
-        server = uvicorn.Server(uvicorn.Config(create_app(settings), log_level="warning"))
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, name="brdf-service")
+        serving = server(settings)
+        thread = threading.Thread(target=serving.run, kwargs={"sockets": [listener]}, name="brdf-service")
         thread.start()
         try:
-            while not server.started and thread.is_alive():
+            while not serving.started and thread.is_alive():
                 time.sleep(0.01)
             yield _url(listener)
         finally:
-            server.should_exit = True
+            serving.should_exit = True
             thread.join()
 
 

@@ -63,15 +63,9 @@ def fit(
     """
     begun = time.perf_counter()
     channels = samples.values.shape[1]
-    check(channels, model, loss, optimizer, fixed or {}, gray, per_channel)
-    made = plan(
-        channels,
-        model,
-        azimuth_observed=samples.azimuth_observed,
-        fixed=fixed,
-        gray=gray,
-        per_channel=per_channel,
-    )
+    seen = samples.azimuth_observed
+    check(channels, model, loss, optimizer, fixed, gray, per_channel, azimuth_observed=seen)
+    made = plan(channels, model, azimuth_observed=seen, fixed=fixed, gray=gray, per_channel=per_channel)
     say = _Teller(progress)
     problem = Problem(made, samples, LOSSES[loss])
     starts = _starts(samples, problem, seed, say)

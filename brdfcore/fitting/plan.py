@@ -101,10 +101,12 @@ def check(
     fixed: Mapping[str, float | Sequence[float]] | None = None,
     gray: Iterable[str] = (),
     per_channel: Iterable[str] = (),
+    *,
+    azimuth_observed: bool = False,
 ) -> None:
     """Raise what `fit` would raise for these arguments and data of so many channels, without fitting."""
     if loss not in LOSSES:
         raise unknown_name("a loss", loss, LOSSES, field="loss")
     if optimizer not in OPTIMIZERS:
         raise unknown_name("an optimizer", optimizer, OPTIMIZERS, field="optimizer")
-    plan(channels, model, fixed=fixed, gray=gray, per_channel=per_channel)
+    plan(channels, model, azimuth_observed=azimuth_observed, fixed=fixed, gray=gray, per_channel=per_channel)

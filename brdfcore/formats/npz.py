@@ -5,6 +5,7 @@
     values                          (N, C) or (N,)
     quantity                        "brdf", "brdf_cos" or "reflectance_factor", as a key or an argument
     channels, sigma, weight, cell   optional: C names; like values; (N,); (N,)
+    azimuth_observed                optional: "true" or "false", as Samples takes it
 
 Nothing in the archive is executed (no pickles), and sizes are checked in the zip's directory and in each array's
 header before anything is unpacked: a small archive can hold gigabytes of zeros, and a header can claim any shape.
@@ -28,7 +29,8 @@ from ._text import brief
 from .samples import ANGLE_UNITS, QUANTITIES, Samples, SamplesKeywords
 
 MAX_UNCOMPRESSED_BYTES = 2 * 2**30  # of all arrays together
-_TEXTS = ("quantity", "angle_unit", "channels")
+_WORDS = ("quantity", "angle_unit", "azimuth_observed")
+_TEXTS = (*_WORDS, "channels")
 _NUMBERS = ("wi", "wo", *ANGLES, "values", "sigma", "weight", "cell")
 _HOW = "Add it to the archive under this key, or pass it as an argument."
 
@@ -44,7 +46,7 @@ def sniff(head: bytes) -> bool:
 def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
     """The samples of an npz archive, values in 1/sr; FormatError or SamplesError names the key at fault."""
     arrays = _unpack(path)
-    stated = {name: str(arrays[name][()]) for name in ("quantity", "angle_unit") if name in arrays}
+    stated = {name: str(arrays[name][()]) for name in _WORDS if name in arrays}
     measured_quantity = declared("quantity", QUANTITIES, stated.get("quantity"), quantity, _HOW)
     directions = {name: arrays[name] for name in ("wi", "wo", *ANGLES) if name in arrays}
     if list(directions) not in (["wi", "wo"], list(ANGLES)):
@@ -81,6 +83,9 @@ def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
         keywords["weight"] = arrays["weight"]
     if "cell" in arrays:
         keywords["cell"] = arrays["cell"]
+    if "azimuth_observed" in stated:
+        told = declared("azimuth_observed", ("true", "false"), stated["azimuth_observed"], None, _HOW)
+        keywords["azimuth_observed"] = told == "true"
     return from_columns(directions, values, **keywords)
 
 
@@ -160,11 +165,11 @@ def _load(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Array:
             )
     with archive.open(member) as file:
         array: Array = np.lib.format.read_array(file, allow_pickle=False)
-    if name in ("quantity", "angle_unit") and array.size != 1:
+    if name in _WORDS and array.size != 1:
         raise FormatError(
             f"Expected {name} to be one word, got an array of shape {array.shape}. Save it as a str.", field=name
         )
-    return array.reshape(()) if name in ("quantity", "angle_unit") else array if name in _TEXTS else array.astype(float)
+    return array.reshape(()) if name in _WORDS else array if name in _TEXTS else array.astype(float)
 
 
 FORMAT = Format(

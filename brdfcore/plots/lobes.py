@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 SCALES = ("linear", "cube_root", "log")
 _PANELS = 6
+_MANY = 1000  # points that an SVG draws one by one; more become a picture in it
 _ROW = 1.75  # inches
 _DECADES = 4  # that the log scale shows below the largest value
 
@@ -167,7 +168,9 @@ def _panel(
     axes.set_thetalim(-math.pi / 2, math.pi / 2)
     axes.set_rlim(0, end)
     axes.plot(theta, _radius(f, scale, top), color=COLOURS[0], linewidth=1.5)
-    axes.plot(at, _radius(y, scale, top), "o", color=COLOURS[1], markersize=3.5, markerfacecolor="white", clip_on=False)
+    (points,) = axes.plot(at, _radius(y, scale, top), "o", color=COLOURS[1], markersize=3.5, markerfacecolor="white")
+    points.set_clip_on(False)
+    points.set_rasterized(at.numel() > _MANY)
     mirror = math.radians(incidence)
     axes.plot([mirror, mirror], [0, end], color="0.45", linewidth=0.8, linestyle="--")
     arrow = {"arrowstyle": "-|>", "color": "0.3", "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}

@@ -34,6 +34,12 @@ def test_reflectances_widen_to_the_channels() -> None:
     assert plan(3, "ashikhmin_shirley").start["ashikhmin_shirley.f0"].shape == (3,)
 
 
+def test_the_check_knows_what_the_data_decide() -> None:
+    check(1, "ward", fixed={"ward.ax": 0.1}, azimuth_observed=True)
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'ward\.a'"):
+        check(1, "ward", fixed={"ward.ax": 0.1})
+
+
 def test_fixed_values_are_not_free() -> None:
     made = plan(1, "lambert + kurt", fixed={"kurt.f0": 0.5})
     assert "kurt.f0" not in made.free

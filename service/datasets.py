@@ -1,0 +1,140 @@
+"""Uploaded measurements on disk, each in a folder named by the hash of its bytes and of what the upload declared.
+
+    datasets/<id>/data         the file, byte for byte
+    datasets/<id>/about.json   what DatasetView shows of it
+
+A folder is filled under incoming/ and renamed once it has been read in full and is on disk, so that what is under
+datasets/ is always whole.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from brdfcore.errors import BrdfError
+from brdfcore.formats import Samples, read
+
+from .schemas import DatasetView, FitRequest, InlineSamples
+
+_ABANDONED = 24 * 3600.0  # no upload lasts so long, so a folder older than this is what a killed server left [s]
+
+
+class Datasets:
+    """The datasets of one data folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._kept, self._incoming = folder / "datasets", folder / "incoming"
+        for place in (self._kept, self._incoming):
+            place.mkdir(parents=True, exist_ok=True)
+        for left in self._incoming.iterdir():
+            if left.stat().st_mtime < time.time() - _ABANDONED:
+                shutil.rmtree(left, ignore_errors=True)
+
+    @contextlib.contextmanager
+    def incoming(self) -> Iterator[Path]:
+        """An empty folder for one upload, gone afterwards whatever happens."""
+        folder = Path(tempfile.mkdtemp(dir=self._incoming))
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)  # after `add` has kept it there is nothing left to remove
+
+    def add(self, folder: Path, sha256: str, declared: dict[str, str | None]) -> tuple[DatasetView, bool]:
+        """The dataset in `folder`/data, and whether it is new; raises what `brdfcore.read` does."""
+        name = hashlib.sha256(f"{sha256} {json.dumps(declared, sort_keys=True)}".encode()).hexdigest()
+        known = self.get(name)
+        if known:
+            return known, False
+        data = folder / "data"
+        samples = read(data, **declared)
+        about = DatasetView(
+            id=name,
+            bytes=data.stat().st_size,
+            sha256=sha256,
+            declared=declared,
+            created=datetime.now(UTC),
+            report={**samples.report(), "source": ""},  # the name that the server gave the file tells nobody anything
+        )
+        (folder / "about.json").write_text(about.model_dump_json(), encoding="utf-8")
+        for path in (data, folder / "about.json", folder):
+            _to_disk(path)
+        try:
+            folder.rename(self._kept / name)
+        except OSError:  # the same upload, at the same time, was first
+            known = self.get(name)
+            if known is None:
+                raise
+            return known, False
+        _to_disk(self._kept)
+        return about, True
+
+    def get(self, name: str) -> DatasetView | None:
+        """The dataset of that id."""
+        if not re.fullmatch("[0-9a-f]{64}", name):
+            return None
+        try:
+            return DatasetView.model_validate_json((self._kept / name / "about.json").read_bytes())
+        except FileNotFoundError:
+            return None
+
+    def samples(self, request: FitRequest) -> Samples:
+        """The samples that a fit's request means, inline or uploaded."""
+        if request.samples is not None:
+            return inline_samples(request.samples)
+        name = request.dataset or ""
+        dataset = self.get(name)
+        if dataset is None:
+            raise missing(name)
+        return read(self._kept / name / "data", **dataset.declared)
+
+
+def missing(name: str) -> BrdfError:
+    """The error for a fit whose dataset does not exist."""
+    return BrdfError(
+        f"Expected dataset to be the id of an uploaded dataset, got {name!r}. Upload it with POST /v1/datasets.",
+        field="dataset",
+    )
+
+
+def inline_samples(given: InlineSamples) -> Samples:
+    """The samples of a request's body; an error names its field as the body does."""
+    keywords: dict[str, Any] = {
+        "channels": given.channels,
+        "sigma": given.sigma,
+        "quantity": given.quantity,
+        "weight": given.weight,
+        "cell": given.cell,
+        "azimuth_observed": given.azimuth_observed,
+    }
+    values = torch.tensor(given.values, dtype=torch.float64)
+    try:
+        if given.wi is not None and given.wo is not None:
+            return Samples(given.wi, given.wo, values, **keywords)
+        theta_i, phi_i = given.theta_i_deg or [], given.phi_i_deg or []
+        theta_o, phi_o = given.theta_o_deg or [], given.phi_o_deg or []
+        return Samples.from_angles(theta_i, phi_i, theta_o, phi_o, values, unit="degrees", **keywords)
+    except BrdfError as error:
+        name = error.field or ""
+        if name in ("theta_i", "phi_i", "theta_o", "phi_o"):
+            name += "_deg"
+        error.field = f"samples.{name}" if name else "samples"
+        raise
+
+
+def _to_disk(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

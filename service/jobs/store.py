@@ -1,0 +1,241 @@
+# ruff: noqa: S608 - what is put into a query's text here are constants of this file; values go as parameters
+"""The durable job store: one SQLite table, changed only by single conditional UPDATEs.
+
+A job is queued, then running under a lease, then succeeded, failed or cancelled. Each claim adds 1 to `attempts`,
+which is also the fencing number: whoever holds an older number, or a job that is no longer running, is refused.
+A restart of the server ends an attempt through no fault of the job, so it is counted apart and capped apart.
+
+Every write is BEGIN IMMEDIATE: a deferred transaction that writes after a read fails at once when another has
+written in between, whatever the timeout.
+"""
+
+import contextlib
+import sqlite3
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..schemas import JobStatus
+
+MOST_CRASHES = 3
+MOST_RESTARTS = 20
+
+_TABLE = """
+CREATE TABLE IF NOT EXISTS jobs (
+    number    INTEGER PRIMARY KEY AUTOINCREMENT,
+    id        TEXT NOT NULL UNIQUE,
+    status    TEXT NOT NULL DEFAULT 'queued'
+              CHECK (status IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
+    body      BLOB NOT NULL,
+    request   TEXT NOT NULL,
+    progress  TEXT,
+    result    TEXT,
+    error     TEXT,
+    attempts  INTEGER NOT NULL DEFAULT 0,
+    restarts  INTEGER NOT NULL DEFAULT 0,
+    lease_end REAL,
+    created   REAL NOT NULL,
+    started   REAL,
+    finished  REAL
+) STRICT;
+CREATE INDEX IF NOT EXISTS jobs_by_status ON jobs (status, number);
+"""
+_COLUMNS = "number, id, status, request, progress, result, error, attempts, created, started, finished"
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job as it stands; request, progress and result are JSON text, times are seconds since 1970."""
+
+    number: int
+    id: str
+    status: JobStatus
+    request: str
+    progress: str | None
+    result: str | None
+    error: str | None
+    attempts: int
+    created: float
+    started: float | None
+    finished: float | None
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A claimed job: its body, and the fencing number that every later word about it must carry."""
+
+    id: str
+    fence: int
+    body: bytes
+
+
+class JobStore:
+    """The jobs of one data folder; usable from every thread and from several processes at once."""
+
+    def __init__(self, path: Path, *, lease: float = 30.0, clock: Callable[[], float] = time.time) -> None:
+        self.lease = lease
+        self._clock = clock
+        self._writing, self._reading = threading.Lock(), threading.Lock()
+        self._writer = _connect(path)
+        self._writer.executescript(_TABLE)
+        self._reader = _connect(path)  # reads never wait for a write to reach the disk
+        self._reader.execute("PRAGMA query_only = ON")
+
+    def close(self) -> None:
+        """Let go of the files."""
+        self._reader.close()
+        self._writer.close()
+
+    def submit(self, request: str, body: bytes) -> Job:
+        """A new queued job; `request` is what to show of it, `body` what to work on."""
+        job_id = uuid.uuid4().hex
+        with self._write() as db:
+            rows = db.execute(
+                f"INSERT INTO jobs (id, body, request, created) VALUES (?, ?, ?, ?) RETURNING {_COLUMNS}",
+                (job_id, body, request, self._clock()),
+            ).fetchall()
+        return _job(rows[0])
+
+    def get(self, job_id: str) -> Job | None:
+        """The job of that id."""
+        rows = self._read(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", job_id)
+        return _job(rows[0]) if rows else None
+
+    def newest(self, limit: int, before: int | None = None) -> list[Job]:
+        """Up to `limit` jobs with numbers below `before`, newest first."""
+        rows = self._read(
+            f"SELECT {_COLUMNS} FROM jobs WHERE number < ? ORDER BY number DESC LIMIT ?",
+            2**63 - 1 if before is None else before,
+            limit,
+        )
+        return [_job(row) for row in rows]
+
+    def body(self, job_id: str) -> bytes | None:
+        """What the job works on, as it was submitted."""
+        rows = self._read("SELECT body FROM jobs WHERE id = ?", job_id)
+        return bytes(rows[0][0]) if rows else None
+
+    def claim(self) -> Attempt | None:
+        """The oldest job that is queued or whose lease has run out, now running under a new lease."""
+        now = self._clock()
+        due = "(status = 'queued' OR (status = 'running' AND lease_end < ?))"
+        if not self._read(f"SELECT 1 FROM jobs WHERE {due} LIMIT 1", now):
+            return None  # an idle dispatcher takes no write lock
+        with self._write() as db:
+            db.execute(
+                "UPDATE jobs SET status = 'failed', error = ?, finished = ? "
+                "WHERE status = 'running' AND lease_end < ? AND attempts - restarts >= ?",
+                (_given_up("was abandoned by its worker"), now, now, MOST_CRASHES),
+            )
+            rows = db.execute(
+                "UPDATE jobs SET status = 'running', attempts = attempts + 1, lease_end = ?, progress = NULL, "
+                "started = coalesce(started, ?) "
+                f"WHERE number = (SELECT number FROM jobs WHERE {due} ORDER BY number LIMIT 1) "
+                "RETURNING id, attempts, body",
+                (now + self.lease, now, now),
+            ).fetchall()
+        return Attempt(*rows[0]) if rows else None
+
+    def running(self) -> dict[str, int]:
+        """The fencing number of each running job, by id."""
+        return dict(self._read("SELECT id, attempts FROM jobs WHERE status = 'running'"))
+
+    def renew(self, attempts: Iterable[Attempt]) -> None:
+        """Extend the leases of those attempts that still hold theirs."""
+        end = self._clock() + self.lease
+        with self._write() as db:
+            db.executemany(
+                "UPDATE jobs SET lease_end = ? WHERE id = ? AND attempts = ? AND status = 'running'",
+                [(end, attempt.id, attempt.fence) for attempt in attempts],
+            )
+
+    def progress(self, attempt: Attempt, progress: str) -> bool:
+        """Whether the attempt still holds its job; if so, its progress is on record."""
+        return self._held("progress = ?", attempt, progress)
+
+    def succeed(self, attempt: Attempt, result: str) -> bool:
+        """Whether the attempt still held its job; if so, it has succeeded with this result."""
+        return self._held("status = 'succeeded', result = ?, finished = ?", attempt, result, self._clock())
+
+    def fail(self, attempt: Attempt, error: str) -> bool:
+        """Whether the attempt still held its job; if so, it has failed for this reason."""
+        return self._held("status = 'failed', error = ?, finished = ?", attempt, error, self._clock())
+
+    def retry(self, attempt: Attempt, what: str) -> bool:
+        """Whether the attempt still held its job; if so, it is queued again, or has failed after too many crashes."""
+        return self._held(
+            "status = iif(attempts - restarts >= ?, 'failed', 'queued'), "
+            "error = iif(attempts - restarts >= ?, ?, NULL), finished = iif(attempts - restarts >= ?, ?, NULL)",
+            attempt,
+            *(MOST_CRASHES, MOST_CRASHES, _given_up(what), MOST_CRASHES, self._clock()),
+        )
+
+    def reclaim(self) -> None:
+        """Queue every running job again: for the one process that knows that nobody works on any of them."""
+        with self._write() as db:
+            db.execute(
+                "UPDATE jobs SET restarts = restarts + 1, status = iif(restarts >= ?, 'failed', 'queued'), "
+                "error = iif(restarts >= ?, ?, NULL), finished = iif(restarts >= ?, ?, NULL) WHERE status = 'running'",
+                (MOST_RESTARTS, MOST_RESTARTS, _interrupted(), MOST_RESTARTS, self._clock()),
+            )
+
+    def cancel(self, job_id: str) -> Job | None:
+        """The job, cancelled if it was queued or running, else as it stands."""
+        with self._write() as db:
+            db.execute(
+                "UPDATE jobs SET status = 'cancelled', finished = ? WHERE id = ? AND status IN ('queued', 'running')",
+                (self._clock(), job_id),
+            )
+        return self.get(job_id)
+
+    def delete(self, job_id: str) -> bool:
+        """Whether there was such a job; now there is none."""
+        with self._write() as db:
+            return db.execute("DELETE FROM jobs WHERE id = ?", (job_id,)).rowcount == 1
+
+    def _held(self, change: str, attempt: Attempt, *values: object) -> bool:
+        with self._write() as db:
+            changed = db.execute(
+                f"UPDATE jobs SET {change} WHERE id = ? AND attempts = ? AND status = 'running'",
+                (*values, attempt.id, attempt.fence),
+            )
+            return changed.rowcount == 1
+
+    @contextlib.contextmanager
+    def _write(self) -> Iterator[sqlite3.Connection]:
+        with self._writing:
+            self._writer.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._writer
+                self._writer.execute("COMMIT")
+            except BaseException:
+                if self._writer.in_transaction:  # a full disk rolls back by itself
+                    self._writer.execute("ROLLBACK")
+                raise
+
+    def _read(self, query: str, *values: object) -> list[Any]:
+        with self._reading:
+            return self._reader.execute(query, values).fetchall()
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    db = sqlite3.connect(path, timeout=5.0, isolation_level=None, check_same_thread=False)
+    db.execute("PRAGMA journal_mode = WAL")
+    db.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
+    return db
+
+
+def _job(row: Any) -> Job:
+    return Job(*row)  # the table is STRICT, and _COLUMNS names the fields in order
+
+
+def _given_up(what: str) -> str:
+    return f"The fit {what} in each of {MOST_CRASHES} attempts. Try fewer samples or a simpler model."
+
+
+def _interrupted() -> str:
+    return f"The server stopped during each of {MOST_RESTARTS + 1} attempts. Submit the fit again once it is stable."

@@ -1,0 +1,13 @@
+"""What the fork server imports before it forks, so that no attempt has to: the work, and what torch loads late.
+
+Torch's first forward derivative imports 800 modules, which takes longer than a small fit. Only the fork server needs
+them this early. No backward pass here: on a machine with a GPU it would start threads, and a fork loses threads.
+"""
+
+import torch
+
+from . import work
+
+__all__ = ["work"]
+
+torch.func.jacfwd(lambda x: (2 * x).sum())(torch.zeros(1))

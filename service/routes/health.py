@@ -1,0 +1,31 @@
+"""Signs of life, and the way in."""
+
+from fastapi import APIRouter, Request
+
+from ..errors import ProblemError, responses
+from ..schemas import HealthView
+from ..state import state
+
+router = APIRouter(tags=["health"])
+
+
+@router.get("/healthz")
+async def healthz() -> HealthView:
+    """That the process answers."""
+    return HealthView(status="ok")
+
+
+@router.get("/readyz", responses=responses(503))
+async def readyz(request: Request) -> HealthView:
+    """That fits can be accepted and will run."""
+    service = state(request)
+    service.store.running()
+    if not service.dispatcher.alive:
+        raise ProblemError(503, "Expected the dispatcher of fits to run, but it has ended. Restart the service.")
+    return HealthView(status="ready")
+
+
+@router.get("/")
+async def root() -> dict[str, str]:
+    """Where to read on."""
+    return {"docs": "/docs", "openapi": "/openapi.json", "fits": "/v1/fits"}

@@ -1,0 +1,17 @@
+"""GET /v1/models: what the text of a fit may name."""
+
+from fastapi import APIRouter, Depends
+
+import brdfcore as bc
+
+from ..errors import responses
+from ..schemas import ModelList, ModelView
+from ._http import json_accepted
+
+router = APIRouter(prefix="/v1/models", tags=["models"], dependencies=[Depends(json_accepted)])
+
+
+@router.get("", responses=responses(406))
+async def models() -> ModelList:
+    """Every model: what it is, its formula, options, and parameters with their boxes."""
+    return ModelList(items=[ModelView(**model.describe()) for model in bc.MODELS.values()])

@@ -1,0 +1,73 @@
+"""Plots of a finished fit, as SVG or PNG by the extension."""
+
+import asyncio
+import hashlib
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+import brdfcore as bc
+from brdfcore import plots
+
+from ..errors import ProblemError, responses
+from ..schemas import FitOutcome, FitRequest
+from ..state import State, state
+from ._http import require_accepted
+from .fits import absent, found
+
+router = APIRouter(prefix="/v1/fits/{fit_id}/plots", tags=["plots"])
+
+Kind = Literal["svg", "png"]
+_MEDIA_TYPE: dict[Kind, str] = {"svg": "image/svg+xml", "png": "image/png"}
+Angle = Annotated[float, Field(ge=0, lt=90)]
+
+
+class Lobes(BaseModel):
+    """What a plot of lobes shows."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    scale: Literal["linear", "cube_root", "log"] = Field("linear", description="of the radius")
+    theta_i_deg: list[Angle] = Field([], max_length=12, description="angles of incidence; the data's, if none")
+
+
+@router.get("/lobes.svg", response_class=Response, responses=responses(404, 406, 409, 422))
+async def lobes_svg(request: Request, fit_id: str, asked: Annotated[Lobes, Query()]) -> Response:
+    """The lobes in the plane of incidence and the measured points over them, as SVG."""
+    return await _lobes(request, fit_id, asked, "svg")
+
+
+@router.get("/lobes.png", response_class=Response, responses=responses(404, 406, 409, 422))
+async def lobes_png(request: Request, fit_id: str, asked: Annotated[Lobes, Query()]) -> Response:
+    """The lobes in the plane of incidence and the measured points over them, as PNG."""
+    return await _lobes(request, fit_id, asked, "png")
+
+
+async def _lobes(request: Request, fit_id: str, asked: Lobes, kind: Kind) -> Response:
+    require_accepted(request, _MEDIA_TYPE[kind])
+    service = state(request)
+    job = found(service, fit_id)
+    if job.result is None:
+        raise ProblemError(
+            409, f"Expected the fit to have succeeded, but it is {job.status}. A plot needs a fit that has succeeded."
+        )
+    shown = f"{bc.__version__} {job.id} {job.finished} {kind} {asked.model_dump_json()}"
+    tag = f'"{hashlib.sha256(shown.encode()).hexdigest()[:32]}"'
+    headers = {"etag": tag, "cache-control": "private, no-cache"}
+    known = [name.strip().removeprefix("W/") for name in request.headers.get("if-none-match", "").split(",")]
+    if tag in known or "*" in known:
+        return Response(status_code=304, headers=headers)
+    body = service.store.body(fit_id)
+    if body is None:
+        raise absent(fit_id)  # removed just now
+    loop = asyncio.get_running_loop()
+    image = await loop.run_in_executor(service.aside, _drawn, service, body, job.result, asked, kind)
+    return Response(image, headers=headers, media_type=_MEDIA_TYPE[kind])
+
+
+def _drawn(service: State, body: bytes, result: str, asked: Lobes, kind: Kind) -> bytes:
+    samples = service.datasets.samples(FitRequest.model_validate_json(body))
+    material = bc.Material.from_json(FitOutcome.model_validate_json(result).material)
+    figure = plots.lobes(material, samples, theta_i_deg=asked.theta_i_deg or None, scale=asked.scale)
+    return plots.to_bytes(figure, kind)

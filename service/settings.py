@@ -1,0 +1,63 @@
+"""What the operator may set, from arguments or from the environment variables BRDF_DATA, BRDF_HOST and so on."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from brdfcore.errors import InvalidValueError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One value a field; the environment variable of `data` is BRDF_DATA, of `fit_seconds` BRDF_FIT_SECONDS.
+
+    data            folder of the datasets, the job store and its lock; made where it does not exist
+    host, port      where the service listens
+    workers         fits that run at the same time, each in one process with one thread
+    upload_limit    largest dataset that is accepted [bytes]
+    inline_rows     most samples that POST /v1/fits takes inline; more go through POST /v1/datasets
+    fit_seconds     longest that one attempt at a fit may run [s]
+    fit_memory      most memory that one attempt may allocate [bytes]
+    """
+
+    data: Path = Path("brdf-data")
+    host: str = "127.0.0.1"
+    port: int = 8000
+    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
+    upload_limit: int = 512 * 2**20
+    inline_rows: int = 10_000
+    fit_seconds: float = 3600.0
+    fit_memory: int = 8 * 2**30
+
+    def __post_init__(self) -> None:
+        for name in ("workers", "upload_limit", "inline_rows", "fit_seconds", "fit_memory"):
+            if not getattr(self, name) > 0:
+                raise _refused(name, "above 0", getattr(self, name))
+        if not 0 <= self.port <= 65535:
+            raise _refused("port", "within 0..65535", self.port)
+
+    @classmethod
+    def from_environment(cls, environment: Mapping[str, str] = os.environ, **given: Any) -> "Settings":
+        """The settings of the environment, except where an argument other than None is given."""
+        values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+        for setting in fields(cls):
+            text = environment.get(f"BRDF_{setting.name.upper()}")
+            if text is not None and setting.name not in values:
+                values[setting.name] = _converted(setting.name, setting.type, text)
+        return cls(**values)
+
+
+def _converted(name: str, kind: Any, text: str) -> Any:
+    try:
+        return kind(text)
+    except ValueError:
+        raise _refused(name, f"of type {kind.__name__}", text) from None
+
+
+def _refused(name: str, rule: str, value: object) -> InvalidValueError:
+    return InvalidValueError(
+        f"Expected {name} to be {rule}, got {value!r}. Correct it, or the environment variable BRDF_{name.upper()}.",
+        field=name,
+    )

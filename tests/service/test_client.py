@@ -1,0 +1,251 @@
+"""The client, against the app without sockets, and alone where the service misbehaves."""
+
+import json
+import pathlib
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+import torch
+from service_cases import csv_file, measured_diffuser
+from starlette.testclient import TestClient
+
+import brdfcore as bc
+from service import client as module
+from service.client import (
+    Client,
+    ClientError,
+    FitFailedError,
+    FitResult,
+    FitUnfinishedError,
+    ProblemError,
+    UnreachableError,
+    WaitError,
+)
+
+
+@pytest.fixture
+def client(http: TestClient) -> Iterator[Client]:
+    with Client("http://testserver", transport=http._transport) as client:
+        yield client
+
+
+def as_samples() -> bc.Samples:
+    given = measured_diffuser()
+    columns = [given[name] for name in ("theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg", "values")]
+    return bc.Samples.from_angles(*columns, unit="degrees")
+
+
+def as_file(folder: pathlib.Path) -> pathlib.Path:
+    path = folder / "diffuser.csv"
+    path.write_bytes(csv_file())
+    return path
+
+
+def as_arrays() -> dict[str, Any]:
+    given = measured_diffuser()
+    arrays = {name: np.asarray(value) for name, value in given.items() if name != "quantity"}
+    return arrays | {"values": arrays["values"][:, 0]}
+
+
+@pytest.mark.parametrize("kind", ["Samples", "like Samples", "path", "str", "arrays", "dataset"])
+def test_every_kind_of_data_gives_the_library_s_numbers(client: Client, tmp_path: pathlib.Path, kind: str) -> None:
+    data = {
+        "Samples": as_samples,
+        "like Samples": lambda: SimpleNamespace(**{n: getattr(as_samples(), n) for n in ("wi", "wo", "values")}),
+        "path": lambda: as_file(tmp_path),
+        "str": lambda: str(as_file(tmp_path)),
+        "arrays": as_arrays,
+        "dataset": lambda: client.upload(as_file(tmp_path), quantity="brdf"),
+    }[kind]()
+    fit = client.fit(data, model="lambert", quantity="brdf")
+    own = bc.fit(as_samples(), "lambert")
+    assert fit.parameters["lambert.kd"] == pytest.approx(float(own.parameters["lambert.kd"]), rel=1e-12)
+    assert fit.intervals["lambert.kd"] == pytest.approx(own.intervals["lambert.kd"].tolist(), rel=1e-9)
+    assert fit.errors["cosine"] == pytest.approx(own.errors["cosine"], rel=1e-9)
+    assert (fit.status, fit.job_status, fit.undetermined) == ("converged", "succeeded", [])
+    assert fit.cost.optimizer == "least_squares"
+    assert fit.result.model == "lambert"
+
+
+def test_arguments_reach_the_service(client: Client) -> None:
+    given = measured_diffuser(channels=2)
+    fit = client.fit(
+        given,
+        model="lambert + ward_bounded",
+        loss="l2",
+        optimizer="lbfgs",
+        fixed={"ward_bounded.rs": torch.zeros(2), "ward_bounded.a": np.float64(0.2)},  # type: ignore[dict-item]
+        gray=("lambert.kd",),
+        seed=3,
+    )
+    shown = fit.view.request
+    assert (shown.loss, shown.optimizer, shown.gray, shown.seed) == ("l2", "lbfgs", ["lambert.kd"], 3)
+    assert shown.fixed == {"ward_bounded.rs": [0.0, 0.0], "ward_bounded.a": 0.2}
+
+
+def test_the_report_and_the_plots_are_for_people(client: Client) -> None:
+    fit = client.fit(as_samples(), model="lambert")
+    assert fit.report().startswith("lambert\nconverged")
+    assert b"<svg" in fit.plot()
+    assert fit.plot("lobes", "png", scale="log", theta_i_deg=[20, 40]).startswith(b"\x89PNG")
+    assert repr(fit) == f"FitResult({fit.id}, 'lambert', succeeded)"
+
+
+def test_many_samples_travel_as_a_file(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "INLINE_ROWS", 10)
+    samples = as_samples()
+    fit = client.fit(samples, model="lambert")
+    assert fit.view.request.samples is None
+    assert fit.result.data["format"] == "npz"
+    assert fit.result.provenance["input"] == samples.hash
+    arrays = client.fit(as_arrays(), model="lambert", quantity="brdf")
+    assert arrays.parameters["lambert.kd"] == pytest.approx(fit.parameters["lambert.kd"], rel=1e-12)
+
+
+def test_what_samples_say_of_their_azimuth_travels_with_them(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    samples = as_samples()
+    turned = bc.Samples(samples.wi, samples.wo, samples.values, azimuth_observed=True)
+    for rows in (100, 10):
+        monkeypatch.setattr(module, "INLINE_ROWS", rows)
+        assert client.fit(turned, model="lambert").result.data["azimuth_observed"] is True
+
+
+def test_a_fit_need_not_be_waited_for(client: Client) -> None:
+    fit = client.fit(as_samples(), model="lambert", wait=False)
+    if fit.view.result is None:
+        with pytest.raises(FitUnfinishedError, match=r"Expected fit \w+ to have succeeded, but it is \w+\."):
+            _ = fit.parameters
+    assert fit.wait() is fit
+    assert client.get(fit.id).parameters == fit.parameters
+    fit.delete()
+    with pytest.raises(ProblemError, match="Expected the id of a fit"):
+        fit.refresh()
+
+
+def test_models_are_listed(client: Client) -> None:
+    assert [model.name for model in client.models()] == list(bc.MODELS)
+
+
+def test_an_upload_is_described(client: Client, tmp_path: pathlib.Path) -> None:
+    dataset = client.upload(as_file(tmp_path), format="csv", quantity="brdf")
+    assert (dataset.report["samples"], dataset.declared["format"]) == (24, "csv")
+
+
+def test_a_refusal_carries_its_sentence_and_field(client: Client) -> None:
+    with pytest.raises(ProblemError, match="Did you mean 'lambert'") as refused:
+        client.fit(as_samples(), model="lambet")
+    assert (refused.value.status, refused.value.field, refused.value.errors) == (422, "model", [])
+    with pytest.raises(ProblemError, match=r"samples.quantity to be given") as refused:
+        client.fit(as_arrays(), model="lambert")
+    assert [error.field for error in refused.value.errors] == ["samples.quantity"]
+    with pytest.raises(ClientError, match="Expected data to hold values, got none"):
+        client.fit({"wi": [[0.0, 0.0, 1.0]]}, model="lambert")
+
+
+def test_an_unreadable_file_is_the_caller_s_error(client: Client, tmp_path: pathlib.Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        client.fit(tmp_path / "nothing.csv", model="lambert")
+
+
+def fit_view(status: str, **more: Any) -> dict[str, Any]:
+    request = {"dataset": "x", "samples": None, "model": "lambert", "loss": "cosine", "optimizer": "auto"}
+    request |= {"fixed": {}, "gray": [], "per_channel": [], "seed": 0}
+    view = {"id": "f1", "status": status, "progress": None, "request": request, "error": None, "attempts": 1}
+    return view | {"created": "2026-01-01T00:00:00Z", "started": None, "finished": None, "result": None} | more
+
+
+def scripted(answer: Callable[[httpx2.Request], httpx2.Response], **more: Any) -> Client:
+    return Client("http://nowhere", transport=httpx2.MockTransport(answer), **more)
+
+
+def test_a_fit_that_failed_or_was_cancelled_is_an_exception() -> None:
+    for view, words in (
+        (fit_view("failed", error="Expected less."), "Expected less."),
+        (fit_view("cancelled"), "The fit f1 was cancelled."),
+    ):
+        client = scripted(lambda request, view=view: httpx2.Response(200, json=view))
+        with client, pytest.raises(FitFailedError, match=words):
+            client.get("f1").wait()
+
+
+def test_waiting_ends_with_its_time() -> None:
+    client = scripted(lambda request: httpx2.Response(200, json=fit_view("running")))
+    with client, pytest.raises(WaitError, match=r"f1 to finish in the time given, but it is running\.") as late:
+        client.fit({"values": [1.0]}, model="lambert", timeout=0.1)
+    assert isinstance(late.value, TimeoutError)
+
+
+def test_cancelling_answers_with_the_cancelled_fit() -> None:
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        return httpx2.Response(200, json=fit_view("cancelled" if request.method == "POST" else "running"))
+
+    with scripted(answer) as client:
+        fit = client.get("f1").cancel()
+    assert isinstance(fit, FitResult)
+    assert fit.job_status == "cancelled"
+
+
+def test_a_service_that_does_not_answer_is_named() -> None:
+    def refuse(request: httpx2.Request) -> httpx2.Response:
+        raise httpx2.ConnectError("refused")
+
+    with scripted(refuse) as client, pytest.raises(UnreachableError, match=r"http://nowhere.*Is it running\?"):
+        client.models()
+
+
+def test_an_answer_of_another_service_is_told_apart() -> None:
+    client = scripted(lambda request: httpx2.Response(502, text="<html>"))
+    with client, pytest.raises(ProblemError, match=r"got status 502. Check the URL.") as refused:
+        client.models()
+    assert refused.value.status == 502
+
+
+def test_the_key_and_the_wait_are_sent() -> None:
+    seen: list[httpx2.Request] = []
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        seen.append(request)
+        return httpx2.Response(202, json=fit_view("queued"))
+
+    with scripted(answer, api_key="secret") as client:
+        client.fit({"values": [1.0], "quantity": "brdf"}, model="lambert", wait=False)
+    assert seen[0].headers["authorization"] == "Bearer secret"
+    assert seen[0].headers["prefer"] == "wait=0"
+    assert json.loads(seen[0].content)["samples"] == {"values": [[1.0]], "quantity": "brdf"}
+
+
+class Counting(httpx2.BaseTransport):
+    """A service that takes any upload and counts the pieces in which it comes."""
+
+    def __init__(self) -> None:
+        self.pieces: list[int] = []
+
+    def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+        assert isinstance(request.stream, httpx2.SyncByteStream)
+        self.pieces = [len(piece) for piece in request.stream]
+        assert request.headers["content-length"] == str(sum(self.pieces))
+        dataset = {"id": "d", "bytes": sum(self.pieces), "sha256": "", "declared": {}, "report": {}}
+        return httpx2.Response(201, json=dataset | {"created": "2026-01-01T00:00:00Z"})
+
+
+def test_a_file_is_streamed_from_the_disk(tmp_path: pathlib.Path) -> None:
+    path = tmp_path / "large"
+    path.write_bytes(bytes(2**20))
+    transport = Counting()
+    with Client("http://nowhere", transport=transport) as client:
+        assert client.upload(path).bytes == 2**20
+    assert max(transport.pieces) < 2**18
+
+
+def test_the_client_needs_no_torch() -> None:
+    code = (
+        "import sys, service.client; print([m for m in ('torch', 'numpy', 'brdfcore', 'fastapi') if m in sys.modules])"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
