@@ -82,7 +82,7 @@ class _OnDemand:
     """Computes each quantity of a pair of float64 directions at most once."""
 
     def __init__(self, wi: Tensor, wo: Tensor, floor: float) -> None:
-        self.above = (wi[..., 2:] > 0) & (wo[..., 2:] > 0)
+        self.above = ~((wi[..., 2:] <= 0) | (wo[..., 2:] <= 0))  # a NaN is not below: it goes on as NaN
         normal = wi.new_tensor([0.0, 0.0, 1.0])
         self.wi = torch.where(self.above, wi, normal)
         self.wo = torch.where(self.above, wo, normal)

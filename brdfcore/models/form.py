@@ -92,15 +92,19 @@ class Form:
         return frozenset().union(*(term.model.pdf_needs for term in self.terms))
 
     def resolve(self, key: str, values: Values) -> Tensor:
-        """The value of any parameter, tied ones included."""
+        """The value of any parameter, tied ones included; a difference stays in its box whatever its owner does."""
         tie = self.ties.get(key)
         if tie is None:
             return values[key]
-        owner = values[tie.owner]
         if tie.total is None:
-            return owner
-        total = owner.new_tensor(tie.total if len(tie.total) > 1 else tie.total[0])
-        return total - owner
+            return values[tie.owner]
+        difference = self.difference(tie, values)
+        return difference.clamp(*self.all_parameters[key].ends(difference.dtype))
+
+    def difference(self, tie: Tie, values: Values) -> Tensor:
+        """The known total of a tie minus its owner's value."""
+        owner, totals = values[tie.owner], tie.total or (0.0,)
+        return owner.new_tensor(totals if len(totals) > 1 else totals[0]) - owner
 
     def of_term(self, term: Term, values: Values) -> dict[str, Tensor]:
         """The values of one term, by the names that its model knows."""

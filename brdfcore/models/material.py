@@ -69,11 +69,13 @@ class Material(nn.Module):
         values = self.values()
         for key, tie in self.form.ties.items():
             parameter = self.form.all_parameters[key]
-            value = self.form.resolve(key, values).detach()
-            parameter.check_shape(key, value)
-            if not bool(parameter.contains(value).all()):
+            value = values[tie.owner] if tie.total is None else self.form.difference(tie, values)
+            parameter.check_shape(key, value.detach())
+            slack = 4 * torch.finfo(torch.float64).eps * max(tie.total or (0.0,))  # the difference's own rounding
+            low, high = parameter.ends(torch.float64)
+            if bool(((value < low - slack) | (value > high + slack)).any()):
                 raise ParameterError(
-                    f"Expected {key} to be in {parameter.box}, got {float(value.min()):.12g} from its tie to "
+                    f"Expected {key} to be in {parameter.box}, got {float(value.detach().min()):.12g} from its tie to "
                     f"{tie.owner}. Change the owner's value or the total.",
                     field=key,
                 )
@@ -128,8 +130,8 @@ class Material(nn.Module):
     def weight(self, wi: Directions, wo: Directions) -> Spectrum:
         """The quotient f cos theta_i / pdf [1], (..., C), which a sample contributes; 0 where the density is."""
         density = self.pdf(wi, wo).unsqueeze(-1)
-        drawn = density > 0
-        return torch.where(drawn, self.f(wi, wo) * wi[..., 2:] / torch.where(drawn, density, 1.0), 0.0)
+        empty = density == 0
+        return torch.where(empty, 0.0, self.f(wi, wo) * wi[..., 2:] / torch.where(empty, 1.0, density))
 
     def forward(self, wi: Directions, wo: Directions) -> Spectrum:
         """The same as `f`."""

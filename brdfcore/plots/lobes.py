@@ -178,7 +178,7 @@ def _panel(
     axes.set_thetagrids([-90, -60, -30, 0, 30, 60, 90])
     axes.set_rgrids(*_ticks(scale, top), angle=-90, fontsize=6.5)
     axes.tick_params(labelsize=7, pad=1)
-    axes.set_title(f"incidence {incidence:g}°", pad=-22, fontsize=9)
+    axes.set_title(f"incidence {incidence:g}°", pad=-19, fontsize=9)
 
 
 def _ticks(scale: str, top: float) -> tuple[list[float], list[str]]:

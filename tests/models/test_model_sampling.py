@@ -1,0 +1,323 @@
+"""Samples against densities, densities against textbook ones, weights against the papers' and against quadrature."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import torch
+from chi_square import cells_of, p_value, sidak
+from model_cases import CHOICE_IDS, CHOICES, DTYPES, corners, draw_values, form_of, hemisphere, material_of
+from scipy import stats
+
+import brdfcore as bc
+from brdfcore.geometry import from_angles
+
+LEVEL = 0.01  # of all tests of one tier together (Sidak)
+COUNT = {"default": 30_000, "full": 1_000_000}
+DIRECTIONS = [(0.0, 0.0), (45.0, 40.0), (80.0, 115.0), (89.9, 200.0)]  # theta_o, phi_o in degrees
+WIDTHS = (0.15, 0.5, 0.85)  # where in the logarithm of the search range
+
+
+def direction(theta_deg: float, phi_deg: float) -> torch.Tensor:
+    return from_angles(*torch.tensor([theta_deg, phi_deg], dtype=torch.float64).deg2rad())
+
+
+def shaped(choice: bc.Model, fraction: float) -> bc.Material:
+    """The choice with its widths at a fraction of their search range; a second width lies elsewhere in it."""
+    shapes = [p for p in choice.parameters if p.scale == "log"]
+    values = {}
+    for k, p in enumerate(shapes):
+        low, high = (math.log(x) for x in p.search_range)
+        values[p.name] = math.exp(low + (high - low) * (fraction + 0.2 * k if fraction < 0.6 else fraction - 0.2 * k))
+    return material_of(choice, values)
+
+
+def uniform(count: int, seed: int) -> torch.Tensor:
+    return torch.rand(count, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(seed))
+
+
+def sampled(material: bc.Material, wo: torch.Tensor, count: int, seed: int) -> torch.Tensor:
+    return material.sample(wo.expand(count, 3), uniform(count, seed)).detach()
+
+
+def chi_square(material: bc.Material, wo: torch.Tensor, count: int, pdf=None, sample=None) -> float:
+    """The p-value of `count` samples (of `sample`, or the material's) against the material's density, or `pdf`."""
+    sample = sample or (lambda count, seed: sampled(material, wo, count, seed))
+    cells = cells_of(sample(20_000, 1))
+    return p_value(sample(count, 2), pdf or (lambda wi: material.pdf(wi, wo)), cells)
+
+
+# --- chi-square ------------------------------------------------------------------------------------------------------
+
+EVERY_CASE = list(itertools.product(range(len(CHOICES)), WIDTHS, DIRECTIONS))
+# The default tier: three cases a choice, which between them hold every width and every direction.
+SOME_CASES = [case for case in EVERY_CASE if (case[0] + WIDTHS.index(case[1]) + DIRECTIONS.index(case[2])) % 4 == 0]
+
+
+def _id(case: tuple[int, float, tuple[float, float]]) -> str:
+    return f"{CHOICE_IDS[case[0]]}-{case[1]}-{case[2][0]}"
+
+
+@pytest.mark.parametrize("case", SOME_CASES, ids=_id)
+def test_samples_follow_their_density(case):
+    which, width, (theta, phi) = case
+    p = chi_square(shaped(CHOICES[which], width), direction(theta, phi), COUNT["default"])
+    assert p > sidak(LEVEL, len(SOME_CASES)), p
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("case", EVERY_CASE, ids=_id)
+def test_samples_follow_their_density_in_full(case):
+    which, width, (theta, phi) = case
+    p = chi_square(shaped(CHOICES[which], width), direction(theta, phi), COUNT["full"])
+    assert p > sidak(LEVEL, len(EVERY_CASE)), p
+
+
+SUMS = [
+    "lambert(kd=0.3) + ward_bounded(rs=0.2, a=0.1)",
+    "coupled_lambert(kd=[0.1, 0.5, 0.3], f0=kurt.f0) + kurt(ks=[0.9, 0.8, 0.1], mx=0.1, my=0.4)",
+    "ashikhmin_shirley(nu=10, nv=400, f0=0.3) + ashikhmin_shirley_diffuse(kd=0.4, f0=ashikhmin_shirley.f0)",
+    "lambert(kd=0.2) + kurt(ks=0.4, m=0.3, f0=0.5) + kurt(ks=0.5, m=0.05, f0=0.9)",
+    "lambert(kd=0) + ward(rs=0)",
+]
+
+
+@pytest.mark.parametrize("theta", [20.0, 85.0])
+@pytest.mark.parametrize("text", SUMS)
+def test_samples_of_sums_follow_the_mixture(text, theta):
+    p = chi_square(bc.material(text), direction(theta, 30), COUNT["default"])
+    assert p > sidak(LEVEL, 2 * len(SUMS)), p
+
+
+@pytest.mark.parametrize("text", ["kurt(mx=0.05, my=0.3)", "ashikhmin_shirley(nu=10, nv=1000)", "lambert"])
+def test_samples_in_float32_follow_the_density(text):
+    material, wo = bc.material(text), direction(60, 20)
+
+    def sample(count: int, seed: int) -> torch.Tensor:
+        wi = material.sample(wo.float().expand(count, 3), uniform(count, seed).float()).detach()
+        assert wi.dtype == torch.float32
+        return wi
+
+    p = chi_square(material, wo, COUNT["default"], sample=sample)
+    assert p > sidak(LEVEL, 3), p
+
+
+# --- its power: what it must reject, with the same counts -------------------------------------------------------------
+
+REJECT = 1e-6
+
+
+def _cos_theta_h(wi: torch.Tensor, wo: torch.Tensor) -> torch.Tensor:
+    h = wi + wo
+    return h[..., 2] / h.norm(dim=-1)
+
+
+def _h_dot_wo(wi: torch.Tensor, wo: torch.Tensor) -> torch.Tensor:
+    return (wi + wo).norm(dim=-1) / 2
+
+
+WRONG = {
+    "without 4 (h.wo)": lambda pdf, wi, wo: pdf(wi, wo) * 4 * _h_dot_wo(wi, wo),
+    "a factor cos theta_h too many": lambda pdf, wi, wo: pdf(wi, wo) * _cos_theta_h(wi, wo),
+    "a factor cos theta_h too few": lambda pdf, wi, wo: pdf(wi, wo) / _cos_theta_h(wi, wo),
+    "per projected solid angle (G-M&D eq. 7)": lambda pdf, wi, wo: pdf(wi, wo) / wi[..., 2].clamp(min=0.1),
+    "2 % too large": lambda pdf, wi, wo: pdf(wi, wo) * 1.02,
+}
+
+
+@pytest.mark.parametrize("text", ["ashikhmin_shirley(nu=10, nv=100)", "ward(ax=0.3, ay=0.1)"])
+@pytest.mark.parametrize("wrong", WRONG)
+def test_wrong_densities_are_rejected(text, wrong):
+    material, wo = bc.material(text), direction(30, 40)
+    p = chi_square(material, wo, COUNT["default"], pdf=lambda wi: WRONG[wrong](material.pdf, wi, wo))
+    assert p < REJECT, p
+
+
+def test_the_density_inverted_as_in_the_jgt_versions_equation_18_is_rejected():
+    """There p(k2) = 4 (k1.h) / p_h(h)."""
+    material, wo = bc.material("ashikhmin_shirley(nu=2, nv=4)"), direction(30, 40)
+    assert chi_square(material, wo, COUNT["default"]) > LEVEL
+    assert chi_square(material, wo, COUNT["default"], pdf=lambda wi: 1 / material.pdf(wi, wo)) < REJECT
+
+
+def test_wrong_widths_are_rejected():
+    wo = direction(30, 40)
+    for good, bad in (("ward(a=0.1)", "ward(a=0.105)"), ("ward(ax=0.1, ay=0.3)", "ward(ax=0.3, ay=0.1)")):
+        wrong = bc.material(bad)
+        p = chi_square(bc.material(good), wo, COUNT["default"], pdf=lambda wi, wrong=wrong: wrong.pdf(wi, wo))
+        assert p < REJECT, (good, bad, p)
+
+
+def test_a_sampler_that_loses_quadrants_is_rejected():
+    """arctan instead of atan2 (Kurt eq. 17, Walter eq. 7): every half vector leans to x > 0."""
+    material, wo = bc.material("ward(ax=0.3, ay=0.1)"), direction(30, 40)
+
+    def sample(count: int, seed: int) -> torch.Tensor:
+        u = uniform(count, seed)
+        u[:, 2] = torch.where((u[:, 2] > 0.25) & (u[:, 2] < 0.75), torch.remainder(u[:, 2] + 0.5, 1), u[:, 2])
+        return material.sample(wo.expand(count, 3), u).detach()
+
+    cells = cells_of(sampled(material, wo, 20_000, 1))
+    assert p_value(sample(COUNT["default"], 2), lambda wi: material.pdf(wi, wo), cells) < REJECT
+
+
+def test_redrawing_what_falls_below_the_horizon_is_rejected():
+    """models.md: "Redrawing it biases the estimator"."""
+    material, wo = bc.material("ward(a=0.3)"), direction(80, 0)
+    drawn = sampled(material, wo, 2 * COUNT["default"], 2)
+    kept = drawn[drawn[:, 2] > 0][: COUNT["default"]]
+    assert len(kept) == COUNT["default"]
+    assert p_value(kept, lambda wi: material.pdf(wi, wo), cells_of(sampled(material, wo, 20_000, 1))) < REJECT
+
+
+# --- weights ---------------------------------------------------------------------------------------------------------
+
+
+def _quantities(wi: torch.Tensor, wo: torch.Tensor, v: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    h = torch.nn.functional.normalize(wi + wo, dim=-1)
+    cos_d = (h * wo).sum(-1)
+    fresnel = v["f0"] + (1 - v["f0"]) * (1 - cos_d) ** 5 if "f0" in v else torch.ones_like(cos_d)
+    return {"d": cos_d, "h": h[:, 2], "i": wi[:, 2], "o": wo[2].expand(len(wi)), "F": fresnel}
+
+
+# Each paper's own weight f cos_i / pdf for a wi drawn from the lobe; q as _quantities, v the values.
+PAPER_WEIGHT = {
+    "lambert": lambda q, v: v["kd"] + 0 * q["i"],
+    "coupled_lambert": lambda q, v: v["kd"] * (1 - q["F"]),
+    "ashikhmin_shirley_diffuse": lambda q, v: (
+        28 / 23 * v["kd"] * (1 - v["f0"]) * (1 - (1 - q["i"] / 2) ** 5) * (1 - (1 - q["o"] / 2) ** 5)
+    ),
+    "ward": lambda q, v: v["rs"] * q["d"] * q["h"] ** 3 * torch.sqrt(q["i"] / q["o"]),  # Walter eq. 10
+    "ward_duer": lambda q, v: v["rs"] * q["d"] * q["h"] ** 3 / q["o"],  # G-M&D eq. 8 per solid angle
+    "ward_neumann": lambda q, v: v["rs"] * q["d"] * q["h"] ** 3 * q["i"] / torch.maximum(q["i"], q["o"]),
+    "ward_bounded": lambda q, v: 2 * v["rs"] / (1 + q["o"] / q["i"]),  # G-M&D eq. 15
+    "ashikhmin_shirley": lambda q, v: v.get("ks", 1.0) * q["F"] * q["i"] / torch.maximum(q["i"], q["o"]),
+    "kurt": lambda q, v: v["ks"] * q["F"] * q["i"] ** (1 - v["alpha"]) / (q["h"] * q["o"] ** v["alpha"]),  # Kurt eq. 21
+    "kurt_plausible": lambda q, v: v["ks"] * q["F"] * q["i"] / (q["h"] * torch.maximum(q["i"], q["o"])),
+}
+
+
+@pytest.mark.parametrize("choice", CHOICES, ids=CHOICE_IDS)
+def test_weights_are_the_papers(choice):
+    rng = np.random.default_rng(31)
+    for theta in (0.0, 40.0, 75.0):
+        material = material_of(choice, draw_values(choice, rng, where="mild"))
+        wo = direction(theta, 70)
+        wi = sampled(material, wo, 500, 3)
+        wi = wi[wi[:, 2] > 1e-3]
+        assert len(wi) > 50
+        v = {key.split(".")[1]: value.detach() for key, value in material.values().items()}
+        expected = PAPER_WEIGHT[choice.name](_quantities(wi, wo, v), v)
+        weight = material.weight(wi, wo)[:, 0].detach()
+        ratio = material.f(wi, wo)[:, 0].detach() * wi[:, 2] / material.pdf(wi, wo).detach()
+        assert float((weight / ratio - 1).abs().max()) <= 1e-14
+        assert float((weight / expected - 1).abs().max()) <= 1e-10
+
+
+@pytest.mark.parametrize("text", SUMS)
+def test_weights_of_sums_use_the_mixture(text):
+    material, wo = bc.material(text), direction(50, 70)
+    wi = sampled(material, wo, 500, 4)
+    pdf = material.pdf(wi, wo).detach()
+    weight = material.weight(wi, wo).detach()
+    expected = material.f(wi, wo).detach() * wi[:, 2:] / pdf.clamp(min=1e-300)[:, None]
+    assert torch.allclose(weight, torch.where(pdf[:, None] > 0, expected, 0.0), rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("text", SUMS)
+def test_the_mixture_is_the_shared_out_density_of_the_terms(text):
+    """pdf = sum of share * pdf of the term, with shares that are positive where a term reflects and sum to 1."""
+    material = bc.material(text)
+    shares = material.form.shares(material.values())
+    assert not shares.requires_grad
+    assert float(shares.sum()) == pytest.approx(1, rel=1e-14)
+    wi, wo = hemisphere(np.random.default_rng(32), 50), hemisphere(np.random.default_rng(33), 50)
+    total = torch.zeros(50, dtype=torch.float64)
+    for share, term in zip(shares, material.form.terms, strict=True):
+        values = {f"{term.model.name}.{k}": v for k, v in material.form.of_term(term, material.values()).items()}
+        values = {k: v.mean() if v.ndim else v for k, v in values.items()}
+        alone = form_of(term.model)
+        total += share * bc.Material(alone, {k: v.detach() for k, v in values.items()}).pdf(wi, wo).detach()
+    assert torch.allclose(material.pdf(wi, wo).detach(), total, rtol=1e-12, atol=0)
+
+
+ALBEDO_CASES = [
+    *((CHOICE_IDS[k], k, 0.5 if k % 2 else 0.85, theta) for k in range(len(CHOICES)) for theta in (10.0, 75.0)),
+    *((text, None, 0.0, theta) for text in SUMS[:-1] for theta in (10.0, 75.0)),
+]
+
+
+def mean_weight(which: int | None, text: str, width: float, theta: float, count: int) -> tuple[float, float, float]:
+    """The mean weight of samples, its standard error, and the albedo by quadrature of f cos_i."""
+    material = bc.material(text) if which is None else shaped(CHOICES[which], width)
+    wo = direction(theta, 25)
+    wi = sampled(material, wo, count, 5)
+    weight = material.weight(wi, wo).detach()[:, -1]
+    cells = cells_of(wi[:20_000])
+    cells_values = cells.integrate(lambda wi: material.f(wi, wo)[:, -1] * wi[:, 2], 1e-6)
+    return float(weight.mean()), float(weight.std()) / math.sqrt(count), float(cells_values.sum())
+
+
+@pytest.mark.parametrize(("text", "which", "width", "theta"), ALBEDO_CASES)
+def test_the_mean_weight_is_the_albedo(text, which, width, theta):
+    mean, error, albedo = mean_weight(which, text, width, theta, COUNT["default"])
+    assert albedo > 0
+    z = stats.norm.isf(sidak(LEVEL, len(ALBEDO_CASES)) / 2)
+    assert z * error <= 0.06 * albedo, "the interval is narrow enough to mean something"
+    assert abs(mean - albedo) <= z * error + 1e-4 * albedo
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("text", "which", "width", "theta"), ALBEDO_CASES)
+def test_the_mean_weight_is_the_albedo_in_full(text, which, width, theta):
+    mean, error, albedo = mean_weight(which, text, width, theta, COUNT["full"])
+    z = stats.norm.isf(sidak(LEVEL, len(ALBEDO_CASES)) / 2)
+    assert z * error <= 0.01 * albedo
+    assert abs(mean - albedo) <= z * error + 1e-4 * albedo
+
+
+# --- ends ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", DTYPES, ids=["float32", "float64"])
+@pytest.mark.parametrize("choice", CHOICES, ids=CHOICE_IDS)
+def test_the_ends_of_u_give_unit_directions(choice, dtype):
+    """0, the largest float32 below 1 and the largest number below 1, in every corner of the box; no NaN anywhere."""
+    largest = float(torch.nextafter(torch.ones((), dtype=dtype), torch.zeros((), dtype=dtype)))
+    ends = (0.0, 2.0**-60, 0.25, 0.5, 0.75, 1 - 2.0**-24, largest)
+    u = torch.tensor(list(itertools.product((0.0, largest), ends, ends)), dtype=torch.float64).to(dtype)
+    assert float(u.max()) < 1
+    directions = [direction(t, p) for t, p in (*DIRECTIONS, (90 - 1e-10, 10))]
+    wo = torch.stack([*directions, *directions]).to(dtype)
+    wo[len(directions) :, 2] *= torch.tensor([1, -1, 0, 1, 1], dtype=dtype)
+    for corner in corners(choice):
+        material = material_of(choice, corner)
+        wi = material.sample(wo[:, None], u).detach()
+        assert not wi.isnan().any(), corner
+        assert float((wi.norm(dim=-1) - 1).abs().max()) <= 16 * torch.finfo(dtype).eps, corner
+        weight = material.weight(wi, wo[:, None])
+        assert not weight.isnan().any(), corner
+        assert bool((weight >= 0).all())
+        assert bool((weight[(wi[..., 2] <= 0) | (wo[:, None, 2] <= 0)] == 0).all())
+
+
+def test_double_precision_u_with_single_precision_directions():
+    """u just below 1 in float64 rounds to 1 in float32; the sample must still be a direction."""
+    u = torch.tensor([[1 - 1e-12, 0.3, 0.3], [0.3, 1 - 1e-12, 0.3], [0.3, 0.3, 1 - 1e-12]], dtype=torch.float64)
+    wo = direction(30, 0).float()
+    for choice in CHOICES:
+        wi = material_of(choice).sample(wo, u)
+        assert wi.dtype == torch.float32
+        assert not wi.isnan().any(), choice
+
+
+@pytest.mark.parametrize("choice", CHOICES, ids=CHOICE_IDS)
+def test_directions_below_the_horizon_have_no_density_and_no_weight(choice):
+    material = material_of(choice, {})
+    wo = direction(80, 0)
+    wi = sampled(material, wo, 2000, 6) * torch.tensor([1.0, 1.0, -1.0], dtype=torch.float64)
+    below = wi[:, 2] <= 0
+    assert bool(below.any())
+    assert bool((material.pdf(wi, wo)[below] == 0).all())
+    assert bool((material.weight(wi, wo)[below] == 0).all())
