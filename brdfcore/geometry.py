@@ -32,6 +32,10 @@ class Geometry(NamedTuple):
     """The quantities that were asked for, each (..., 1); a plain tuple of tensors, so it crosses vmap and compile."""
 
     above: Mask  # both directions above the horizon
+    xi: Quantity = _NOT_ASKED_FOR  # the horizontal components of wi
+    yi: Quantity = _NOT_ASKED_FOR
+    xo: Quantity = _NOT_ASKED_FOR  # and of wo
+    yo: Quantity = _NOT_ASKED_FOR
     ci: Quantity = _NOT_ASKED_FOR  # cos theta_i
     co: Quantity = _NOT_ASKED_FOR  # cos theta_o
     over_ci: Quantity = _NOT_ASKED_FOR  # 1 / cos theta_i; models multiply by reciprocals, see above
@@ -40,6 +44,9 @@ class Geometry(NamedTuple):
     p: Quantity = _NOT_ASKED_FOR  # slope of the half vector along x
     q: Quantity = _NOT_ASKED_FOR  # slope of the half vector along y
     e2: Quantity = _NOT_ASKED_FOR  # p^2 + q^2
+    ux: Quantity = _NOT_ASKED_FOR  # the components of the unit half vector
+    uy: Quantity = _NOT_ASKED_FOR
+    uz: Quantity = _NOT_ASKED_FOR
     h_dot_wo: Quantity = _NOT_ASKED_FOR  # cosine between half vector and either direction
     over_h_dot_wo: Quantity = _NOT_ASKED_FOR  # its reciprocal
 
@@ -88,6 +95,22 @@ class _OnDemand:
         self.wo = torch.where(self.above, wo, normal)
         self.floor = floor
 
+    @property
+    def xi(self) -> Tensor:
+        return self.wi[..., :1]
+
+    @property
+    def yi(self) -> Tensor:
+        return self.wi[..., 1:2]
+
+    @property
+    def xo(self) -> Tensor:
+        return self.wo[..., :1]
+
+    @property
+    def yo(self) -> Tensor:
+        return self.wo[..., 1:2]
+
     @cached_property
     def ci(self) -> Tensor:
         return self.wi[..., 2:].clamp(min=self.floor)
@@ -118,11 +141,11 @@ class _OnDemand:
 
     @cached_property
     def hx(self) -> Tensor:
-        return self.wi[..., :1] + self.wo[..., :1]
+        return self.xi + self.xo
 
     @cached_property
     def hy(self) -> Tensor:
-        return self.wi[..., 1:2] + self.wo[..., 1:2]
+        return self.yi + self.yo
 
     @cached_property
     def p(self) -> Tensor:
@@ -135,6 +158,18 @@ class _OnDemand:
     @cached_property
     def e2(self) -> Tensor:
         return self.p.square() + self.q.square()
+
+    @property
+    def ux(self) -> Tensor:
+        return self.hx / (2 * self.h_dot_wo)
+
+    @property
+    def uy(self) -> Tensor:
+        return self.hy / (2 * self.h_dot_wo)
+
+    @property
+    def uz(self) -> Tensor:
+        return self.hz / (2 * self.h_dot_wo)
 
     @cached_property
     def h_dot_wo(self) -> Tensor:

@@ -97,7 +97,8 @@ def _raw_ends(parameter: Parameter, dtype: torch.dtype) -> tuple[float, float]:
         raw = torch.tensor(end, dtype=dtype)
         raw = torch.log(raw) if parameter.scale == "log" else raw
         towards = torch.tensor(inwards, dtype=dtype)
-        while not bool(parameter.contains(torch.exp(raw) if parameter.scale == "log" else raw)):
+        # in double precision: the end itself, rounded, may lie outside
+        while not bool(parameter.contains((torch.exp(raw) if parameter.scale == "log" else raw).double())):
             raw = torch.nextafter(raw, towards)
         return float(raw)
 

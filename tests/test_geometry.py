@@ -39,12 +39,19 @@ def test_quantities_against_exact_arithmetic(dtype):
         h = [a + b for a, b in zip(i, o, strict=True)]
         norm = mp.sqrt(sum(c * c for c in h))
         exact = {
+            "xi": i[0],
+            "yi": i[1],
+            "xo": o[0],
+            "yo": o[1],
             "ci": i[2],
             "co": o[2],
             "hz": h[2],
             "p": h[0] / h[2],
             "q": h[1] / h[2],
             "e2": (h[0] / h[2]) ** 2 + (h[1] / h[2]) ** 2,
+            "ux": h[0] / norm,
+            "uy": h[1] / norm,
+            "uz": h[2] / norm,
             "h_dot_wo": norm / 2,
         }
         exact |= {f"over_{name}": 1 / value for name, value in exact.items() if name in ("ci", "co", "hz", "h_dot_wo")}
@@ -75,7 +82,7 @@ def test_pairs_at_or_below_the_horizon_are_evaluated_at_the_normal(dtype):
         g = geometry(wi, wo, QUANTITIES)
         assert not g.above.any()
         for name in QUANTITIES:
-            expected = {"p": 0, "q": 0, "e2": 0, "over_hz": 0.5}.get(name, 1)
+            expected = {"over_hz": 0.5, **dict.fromkeys(("xi", "yi", "xo", "yo", "p", "q", "e2", "ux", "uy"), 0)}.get(name, 1)
             assert bool((getattr(g, name) == expected).all()), name
 
 

@@ -1,12 +1,20 @@
 """The models, by name: one file a lobe or diffuse term."""
 
+from .ashikhmin_premoze import AshikhminPremoze
 from .ashikhmin_shirley import AshikhminShirley
 from .ashikhmin_shirley_diffuse import AshikhminShirleyDiffuse
 from .base import Model
+from .beckmann import Beckmann
+from .blinn_phong import BlinnPhong
+from .cook_torrance import CookTorrance
 from .coupled_lambert import CoupledLambert
+from .edwards import Edwards
+from .ggx import Ggx
 from .kurt import Kurt
 from .kurt_plausible import KurtPlausible
+from .lafortune import Lafortune
 from .lambert import Lambert
+from .oren_nayar import OrenNayar
 from .ward import Ward
 from .ward_bounded import WardBounded
 from .ward_duer import WardDuer
@@ -18,6 +26,7 @@ MODELS: dict[str, type[Model]] = {
         Lambert,
         CoupledLambert,
         AshikhminShirleyDiffuse,
+        OrenNayar,
         Ward,
         WardDuer,
         WardNeumann,
@@ -25,6 +34,13 @@ MODELS: dict[str, type[Model]] = {
         AshikhminShirley,
         Kurt,
         KurtPlausible,
+        BlinnPhong,
+        CookTorrance,
+        Lafortune,
+        AshikhminPremoze,
+        Edwards,
+        Ggx,
+        Beckmann,
     )
 }
 

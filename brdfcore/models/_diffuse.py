@@ -17,12 +17,27 @@ from .base import Model
 KD = Parameter("kd", 0.2, 0.0, 1.0, "diffuse reflectance [1]", per_channel="yes")
 
 
-class Diffuse(Model):
-    """A term that a diffuse reflectance multiplies, with cosine-distributed samples."""
+class CosineSampled(Model):
+    """A term with cosine-distributed samples."""
+
+    pdf_needs = frozenset({"ci"})
+
+    def sample(self, values: Values, wo: Tensor, u: Tensor) -> Tensor:
+        """Cosine-distributed directions wi (..., 3)."""
+        s, t = u[..., :1], 2 * math.pi * u[..., 1:]
+        r = torch.sqrt(s)
+        return torch.cat([r * torch.cos(t), r * torch.sin(t), torch.sqrt(1 - s)], dim=-1)
+
+    def pdf(self, values: Values, g: Geometry) -> Tensor:
+        """The density cos theta_i / pi [1/sr], (..., 1)."""
+        return g.ci / math.pi
+
+
+class Diffuse(CosineSampled):
+    """A term that a diffuse reflectance multiplies."""
 
     scale = "kd"
     parameters: tuple[Parameter, ...] = (KD,)
-    pdf_needs = frozenset({"ci"})
     basis_needs: ClassVar[tuple[str, ...]] = ()
     typical_albedo = (1.0,)
 
@@ -34,16 +49,6 @@ class Diffuse(Model):
     def coefficients(self, values: Values) -> tuple[Tensor, ...]:
         """The reflectance alone."""
         return (values["kd"],)
-
-    def sample(self, values: Values, wo: Tensor, u: Tensor) -> Tensor:
-        """Cosine-distributed directions wi (..., 3)."""
-        s, t = u[..., :1], 2 * math.pi * u[..., 1:]
-        r = torch.sqrt(s)
-        return torch.cat([r * torch.cos(t), r * torch.sin(t), torch.sqrt(1 - s)], dim=-1)
-
-    def pdf(self, values: Values, g: Geometry) -> Tensor:
-        """The density cos theta_i / pi [1/sr], (..., 1)."""
-        return g.ci / math.pi
 
 
 class CoupledDiffuse(Diffuse):

@@ -1,4 +1,4 @@
-"""Lobes whose half vector has Gaussian slopes: Ward's family and Kurt's.
+"""Lobes whose half vector has Gaussian slopes: Ward's family, Kurt's, and microfacet lobes that are sampled so.
 
     E = exp(-(p^2/ax^2 + q^2/ay^2))                                           [1]
     p_h = E / (pi ax ay cos^3 theta_h)                                        [1/sr of the half vector]

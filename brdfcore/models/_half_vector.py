@@ -1,7 +1,7 @@
-"""What every lobe around the half vector shares: its width options, and sampling by the half vector.
+"""What every lobe around the half vector shares: its width options, and for most of them sampling by the half vector.
 
-wi = reflect(wo, h) for a half vector h drawn from the lobe. Both width layouts are one lobe: isotropic declares and
-evaluates a single width, anisotropic one along x and one along y.
+Both width layouts are one lobe: isotropic declares and evaluates a single width, anisotropic one along x and one along
+y. wi = reflect(wo, h) for a half vector h that is drawn from the lobe whatever wo is.
 """
 
 from abc import abstractmethod
@@ -16,8 +16,8 @@ from .base import Model
 ISOTROPY = ("isotropic", "anisotropic")
 
 
-class HalfVectorLobe(Model):
-    """A lobe with one width or two, sampled by its half vector."""
+class WidthLobe(Model):
+    """A lobe with one width or two."""
 
     option_groups: ClassVar[tuple[tuple[str, ...], ...]] = (ISOTROPY,)
     widths_along: ClassVar[tuple[str, str, str]]  # the width's names: isotropic, along x, along y
@@ -40,6 +40,10 @@ class HalfVectorLobe(Model):
     @abstractmethod
     def width_parameters(self) -> tuple[Parameter, ...]:
         """The declared width or widths."""
+
+
+class HalfVectorLobe(WidthLobe):
+    """A lobe sampled by its half vector."""
 
     @abstractmethod
     def slopes(self, values: Values, u: Tensor) -> tuple[Tensor, Tensor]:

@@ -1,4 +1,4 @@
-"""A lobe under one reflectance: f = rs * lobe. Ward's family."""
+"""A lobe under one reflectance: f = ks * lobe, under the name that the model's `scale` gives it."""
 
 from abc import abstractmethod
 from typing import ClassVar
@@ -7,25 +7,35 @@ from torch import Tensor
 
 from ..geometry import Geometry
 from ..parameters import Parameter, Values
-from ._half_vector import HalfVectorLobe
+from .base import Model
 
 
-class ScaledLobe(HalfVectorLobe):
-    """A half-vector lobe that a specular reflectance multiplies."""
+class ScaledLobe(Model):
+    """A lobe that a specular reflectance multiplies."""
 
-    scale = "rs"
+    scale = "ks"
     lobe_needs: ClassVar[tuple[str, ...]] = ()
     typical_albedo = (1.0,)
 
     @property
+    @abstractmethod
+    def shape(self) -> tuple[Parameter, ...]:
+        """The parameters of the lobe beside its reflectance."""
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Reflectance and widths."""
-        rs = Parameter("rs", 0.1, 0.0, 1.0, "specular reflectance [1]", per_channel="yes")
-        return (rs, *self.width_parameters)
+        """Reflectance and shape."""
+        reflectance = Parameter(self.scale, 0.1, 0.0, 1.0, "specular reflectance [1]", per_channel="yes")
+        return (reflectance, *self.shape)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """The quantities of the geometry that the lobe reads."""
+        return frozenset(self.lobe_needs)
 
     @abstractmethod
     def lobe(self, values: Values, g: Geometry) -> Tensor:
-        """The lobe for rs = 1 [1/sr], (..., 1)."""
+        """The lobe for a reflectance of 1 [1/sr], (..., 1)."""
 
     def basis(self, values: Values, g: Geometry) -> tuple[Tensor, ...]:
         """The lobe alone."""
@@ -33,4 +43,4 @@ class ScaledLobe(HalfVectorLobe):
 
     def coefficients(self, values: Values) -> tuple[Tensor, ...]:
         """The reflectance alone."""
-        return (values["rs"],)
+        return (values[self.scale],)

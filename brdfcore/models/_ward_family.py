@@ -6,13 +6,20 @@ from abc import abstractmethod
 from torch import Tensor
 
 from ..geometry import Geometry
-from ..parameters import Values
+from ..parameters import Parameter, Values
 from ._gaussian_slopes import GaussianSlopes
 from ._scaled_lobe import ScaledLobe
 
 
 class WardFamily(ScaledLobe, GaussianSlopes):
     """A Gaussian-slope lobe under a specular reflectance."""
+
+    scale = "rs"
+
+    @property
+    def shape(self) -> tuple[Parameter, ...]:
+        """The widths."""
+        return self.width_parameters
 
     @property
     def needs(self) -> frozenset[str]:

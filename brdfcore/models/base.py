@@ -26,7 +26,6 @@ class Model(ABC):
     name: ClassVar[str]
     option_groups: ClassVar[tuple[tuple[str, ...], ...]] = ()
     reciprocal: ClassVar[bool] = True
-    scale: ClassVar[str]  # the reflectance of which f is a multiple where all else is held
 
     def __init__(self, options: Sequence[str] = ()) -> None:
         self.options = tuple(
@@ -41,6 +40,11 @@ class Model(ABC):
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.options})"
+
+    @property
+    @abstractmethod
+    def scale(self) -> str:
+        """The reflectance of which f is a multiple where all else is held; not a parameter's name where none is."""
 
     @property
     @abstractmethod

@@ -4,6 +4,7 @@ A Form never changes and holds no numbers but the totals of its ties. Its functi
 "label.name" -> () or (C,)) and the geometry, so they can be differentiated, batched by vmap, and compiled.
 """
 
+import functools
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -129,17 +130,19 @@ class Form:
         return low, high
 
     def f(self, values: Values, g: Geometry) -> Spectrum:
-        """The BRDF [1/sr], (..., C), or (..., 1) where all coefficients are gray; exactly 0 below the horizon."""
-        bases: list[Tensor] = []
-        coefficients: list[Tensor] = []
+        """The BRDF [1/sr], (..., C), or (..., 1) where nothing has colour; exactly 0 below the horizon."""
+        parts: list[tuple[Tensor, Tensor]] = []
         for term in self.terms:
             own = self.of_term(term, values)
-            bases.extend(term.model.basis(own, g))
-            coefficients.extend(torch.atleast_1d(c) for c in term.model.coefficients(own))
-        if len(bases) == 1:
-            total = bases[0] * coefficients[0]
+            parts.extend(zip(term.model.basis(own, g), term.model.coefficients(own), strict=True))
+        shared = [(basis, torch.atleast_1d(c)) for basis, c in parts if basis.shape[-1] == 1]
+        sums = [basis * c for basis, c in parts if basis.shape[-1] > 1]  # shapes that have colour themselves
+        if len(shared) > 1:  # one matrix product for all channels
+            bases, coefficients = zip(*shared, strict=True)
+            sums.append(_columns(bases) @ torch.stack(torch.broadcast_tensors(*coefficients)))
         else:
-            total = _columns(bases) @ torch.stack(torch.broadcast_tensors(*coefficients))
+            sums.extend(basis * c for basis, c in shared)
+        total = functools.reduce(torch.add, sums)
         return torch.where(g.above, total, 0.0)
 
     def shares(self, values: Values) -> Tensor:

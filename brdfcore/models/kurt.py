@@ -1,10 +1,12 @@
 """Kurt, Szirmay-Kalos and Krivanek's anisotropic lobe for data fitting.
 
     f(wi, wo) = ks F D / (4 (h.wo) (ci co)^alpha)                                           [1/sr]
-    D = E / (pi mx my cos^4 theta_h),  E = exp(-(p^2/mx^2 + q^2/my^2)),  F = f0 + (1 - f0) (1 - h.wo)^5
+    D = E / (pi mx my cos^4 theta_h),  E = exp(-(p^2/mx^2 + q^2/my^2))
 
-ks, specular reflectance [1]; f0, Fresnel reflectance at normal incidence [1]; mx, my, root-mean-square slopes times
-sqrt 2 along x and y [1], or one width m; alpha, shadowing exponent [1].
+ks, specular reflectance [1]; mx, my, root-mean-square slopes times sqrt 2 along x and y [1], or one width m; alpha,
+shadowing exponent [1].
+Options: F is `schlick` of f0, Fresnel reflectance at normal incidence [1], as in the paper, `constant` 1, or exact:
+`dielectric` of eta, relative index of refraction [1], or `conductor` of eta and k, its extinction coefficient [1].
 Reciprocal. Conserves energy for alpha = 0; for every alpha > 0 the directional albedo diverges towards grazing,
 although the paper calls suitable alpha plausible.
 Source: SIGGRAPH Computer Graphics 44(1), 2010, eqs. 4, 5, 10, 12; sampling eqs. 16-19, density eq. 20, weight eq. 21.

@@ -1,6 +1,8 @@
 """What the shared model tests are run over: every model with every choice of options, drawn values, hard directions."""
 
 import itertools
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import torch
@@ -35,6 +37,12 @@ def material_of(choice: bc.Model, values: dict[str, object] | None = None) -> bc
     """A material of this one term, with values by parameter name."""
     given = {f"{choice.name}.{name}": value for name, value in (values or {}).items()}
     return bc.Material(form_of(choice), given)
+
+
+def entry(table: Mapping[str, Any], choice: bc.Model) -> Any:
+    """What a table by model says of a choice: under "name(word)" for one of its words, else under "name"."""
+    keys = (*(f"{choice.name}({word})" for word in choice.options), choice.name)
+    return table[next((key for key in keys if key in table), choice.name)]
 
 
 def draw_value(parameter: Parameter, rng: np.random.Generator, *, where: str) -> float:

@@ -183,6 +183,9 @@ def test_values_beyond_the_box_are_evaluated_on_its_end():
     assert torch.equal(material.f(*pairs()), end.f(*pairs()))
 
 
+EVEN = ("sigma", "k")  # f goes with their square, so that 0 is a stationary point of the formula itself
+
+
 @every_choice
 def test_gradients_pass_on_the_ends_of_the_box(choice):
     """A start on an end must be able to leave it: no transform may flatten the gradient there."""
@@ -195,8 +198,12 @@ def test_gradients_pass_on_the_ends_of_the_box(choice):
             inner = material_of(choice, values)
             wi, wo = lobe_pairs(inner if p.scale == "linear" else material, rng, 20)
             stored = material.get_parameter(f"raw.{choice.name}.{p.name}")
-            (gradient,) = torch.autograd.grad(material.f(wi, wo).sum(), stored)
-            assert gradient.abs() > 0, (p.name, corner[p.name])
+            (slope,) = torch.autograd.grad(material.values()[f"{choice.name}.{p.name}"], stored)
+            assert slope.abs() > 0, (p.name, corner[p.name])
+            f = material.f(wi, wo)
+            (gradient,) = torch.autograd.grad(f.sum(), stored)
+            stationary = (p.name in EVEN and corner[p.name] == 0) or not f.any()
+            assert stationary or gradient.abs() > 0, (p.name, corner[p.name])
 
 
 # --- making ----------------------------------------------------------------------------------------------------------

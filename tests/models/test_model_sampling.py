@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 from chi_square import cells_of, p_value, sidak
-from model_cases import CHOICE_IDS, CHOICES, DTYPES, corners, draw_values, form_of, hemisphere, material_of
+from model_cases import CHOICE_IDS, CHOICES, DTYPES, corners, draw_values, entry, form_of, hemisphere, material_of
 from scipy import stats
 
 import brdfcore as bc
@@ -174,11 +174,38 @@ def test_redrawing_what_falls_below_the_horizon_is_rejected():
 # --- weights ---------------------------------------------------------------------------------------------------------
 
 
+def _fresnel(c: torch.Tensor, v: dict[str, torch.Tensor]) -> torch.Tensor:
+    """Schlick's factor of f0, Fresnel's equations for an index eta + i k, or 1."""
+    if "eta" in v:
+        index = torch.complex(v["eta"], v.get("k", torch.zeros_like(v["eta"])))
+        g = torch.sqrt(index**2 - 1 + c**2)
+        rs, rp = (c - g) / (c + g), (index**2 * c - g) / (index**2 * c + g)
+        return (rs.abs() ** 2 + rp.abs() ** 2) / 2
+    return v["f0"] + (1 - v["f0"]) * (1 - c) ** 5 if "f0" in v else torch.ones_like(c)
+
+
 def _quantities(wi: torch.Tensor, wo: torch.Tensor, v: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
     h = torch.nn.functional.normalize(wi + wo, dim=-1)
     cos_d = (h * wo).sum(-1)
-    fresnel = v["f0"] + (1 - v["f0"]) * (1 - cos_d) ** 5 if "f0" in v else torch.ones_like(cos_d)
-    return {"d": cos_d, "h": h[:, 2], "i": wi[:, 2], "o": wo[2].expand(len(wi)), "F": fresnel}
+    fresnel = _fresnel(cos_d, v)
+    side = wi[:, 0] * wo[0] + wi[:, 1] * wo[1]  # cos(phi_i - phi_o) sin theta_i sin theta_o
+    return {"d": cos_d, "h": h[:, 2], "i": wi[:, 2], "o": wo[2].expand(len(wi)), "F": fresnel, "side": side, "wo": wo}
+
+
+def _eon_weight(q: dict[str, torch.Tensor], v: dict[str, torch.Tensor]) -> torch.Tensor:
+    """pi f of Portsmouth, Kutz and Hill 2025, listing 1 with the exact directional albedo."""
+    r = 2 * v["sigma"] / math.pi
+    a = 1 / (1 + (1 / 2 - 2 / (3 * math.pi)) * r)
+
+    def albedo(mu: torch.Tensor) -> torch.Tensor:
+        sine = torch.sqrt((1 - mu) * (1 + mu))
+        g = sine * (torch.acos(mu) - sine * mu) + 2 / 3 * (sine / mu * (1 - sine**3) - sine)
+        return a + r * a / math.pi * g
+
+    t = torch.where(q["side"] > 0, q["side"] / torch.maximum(q["i"], q["o"]), q["side"])
+    mean = a * (1 + (2 / 3 - 28 / (15 * math.pi)) * r)
+    often = v["kd"] ** 2 * mean / (1 - v["kd"] * (1 - mean)) / (1 - mean)
+    return v["kd"] * a * (1 + r * t) + often * (1 - albedo(q["i"])) * (1 - albedo(q["o"]))
 
 
 # Each paper's own weight f cos_i / pdf for a wi drawn from the lobe; q as _quantities, v the values.
@@ -195,6 +222,31 @@ PAPER_WEIGHT = {
     "ashikhmin_shirley": lambda q, v: v.get("ks", 1.0) * q["F"] * q["i"] / torch.maximum(q["i"], q["o"]),
     "kurt": lambda q, v: v["ks"] * q["F"] * q["i"] ** (1 - v["alpha"]) / (q["h"] * q["o"] ** v["alpha"]),  # Kurt eq. 21
     "kurt_plausible": lambda q, v: v["ks"] * q["F"] * q["i"] / (q["h"] * torch.maximum(q["i"], q["o"])),
+    "blinn_phong": lambda q, v: v["ks"] * (v["n"] + 2) / (v["n"] + 1) * q["d"] * q["i"],
+    "cook_torrance": lambda q, v: (
+        v["ks"]
+        * q["F"]
+        * q["d"]
+        / (q["h"] * q["o"])
+        * (2 * q["h"] / q["d"] * torch.minimum(q["i"], q["o"])).clamp(max=1)
+    ),
+    "ashikhmin_premoze": lambda q, v: v["ks"] * q["F"] * q["d"] * q["i"] / (q["i"] + q["o"] - q["i"] * q["o"]),
+    "lafortune": lambda q, v: (
+        v["ks"]
+        * (v["n"] + 2)
+        / (v["n"] + 1)
+        * q["i"]
+        * (torch.stack([v["cx"], v["cy"], torch.ones_like(v["cx"])]) * q["wo"]).norm() ** v["n"]
+    ),
+    "edwards": lambda q, v: v["ks"] + 0 * q["i"],  # the lump's own density: every sample weighs the same
+    "oren_nayar": lambda q, v: (
+        v["kd"] * (1 - 0.5 * v["sigma"] ** 2 / (v["sigma"] ** 2 + 0.33))
+        + v["kd"]
+        * (0.45 * v["sigma"] ** 2 / (v["sigma"] ** 2 + 0.09))
+        * q["side"].clamp(min=0)
+        / torch.maximum(q["i"], q["o"])
+    ),
+    "oren_nayar(energy_preserving)": _eon_weight,
 }
 
 
@@ -208,7 +260,7 @@ def test_weights_are_the_papers(choice):
         wi = wi[wi[:, 2] > 1e-3]
         assert len(wi) > 50
         v = {key.split(".")[1]: value.detach() for key, value in material.values().items()}
-        expected = PAPER_WEIGHT[choice.name](_quantities(wi, wo, v), v)
+        expected = entry(PAPER_WEIGHT, choice)(_quantities(wi, wo, v), v)
         weight = material.weight(wi, wo)[:, 0].detach()
         ratio = material.f(wi, wo)[:, 0].detach() * wi[:, 2] / material.pdf(wi, wo).detach()
         assert float((weight / ratio - 1).abs().max()) <= 1e-14

@@ -3,7 +3,17 @@
 import pytest
 import reference
 import torch
-from model_cases import CHOICE_IDS, CHOICES, DTYPES, above_horizon, corners, form_of, material_of, not_above_horizon
+from model_cases import (
+    CHOICE_IDS,
+    CHOICES,
+    DTYPES,
+    above_horizon,
+    corners,
+    entry,
+    form_of,
+    material_of,
+    not_above_horizon,
+)
 from reference import exact, mp
 from torch.func import grad, vmap
 
@@ -79,7 +89,7 @@ def test_a_value_is_infinite_only_where_the_true_number_overflows(choice, dtype)
         infinite = got.isinf().nonzero().tolist()
         for corner, pair in infinite[:: max(1, len(infinite) // 20)]:
             v = {key.split(".")[1]: mp.mpf(float(value[corner])) for key, value in values.items()}
-            true = formula[choice.name](v, exact(wi[pair].tolist()), exact(wo[pair].tolist()))
+            true = entry(formula, choice)(v, exact(wi[pair].tolist()), exact(wo[pair].tolist()))
             true = true[0] if what == "f" else true
             assert true > torch.finfo(dtype).max, f"{what} at {v}, {wi[pair].tolist()}, {wo[pair].tolist()}: {true}"
 
