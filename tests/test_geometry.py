@@ -82,7 +82,9 @@ def test_pairs_at_or_below_the_horizon_are_evaluated_at_the_normal(dtype):
         g = geometry(wi, wo, QUANTITIES)
         assert not g.above.any()
         for name in QUANTITIES:
-            expected = {"over_hz": 0.5, **dict.fromkeys(("xi", "yi", "xo", "yo", "p", "q", "e2", "ux", "uy"), 0)}.get(name, 1)
+            expected = {"over_hz": 0.5, **dict.fromkeys(("xi", "yi", "xo", "yo", "p", "q", "e2", "ux", "uy"), 0)}.get(
+                name, 1
+            )
             assert bool((getattr(g, name) == expected).all()), name
 
 

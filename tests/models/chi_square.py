@@ -51,7 +51,7 @@ class Cells:
         side_t, side_p = (band == bands - 1) * 1 - (band == 0), (sector == sectors - 1) * 1 - (sector == 0)
         pending = np.arange(self.count)
         result = np.full(self.count, np.nan)
-        for pieces in (1, 2, 4, 8, 16, 32, 64):
+        for pieces in (1, 2, 4, 8, 16, 32, 64, 128):
             steps = np.linspace(0, 1, pieces + 1)
             value = np.empty(len(pending))
             chunk = max(1, 2**18 // (pieces * NODES) ** 2)
@@ -73,11 +73,12 @@ class Cells:
 
 
 def _graded(steps: np.ndarray, low: np.ndarray, high: np.ndarray, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights (n, m) on each interval, crowded to its low end where side > 0, to its high end where < 0."""
+    """Nodes and weights (n, m) on each interval, crowded to its low end where side > 0, high where < 0, else both."""
     s, ds = panels(steps, NODES)
     side, span, low = side[:, None], (high - low)[:, None], low[:, None]
-    part = np.where(side > 0, s**6, np.where(side < 0, 1 - (1 - s) ** 6, s))
-    slope = np.where(side > 0, 6 * s**5, np.where(side < 0, 6 * (1 - s) ** 5, 1.0))
+    middle, middle_slope = s**3 * (10 - s * (15 - 6 * s)), 30 * (s * (1 - s)) ** 2
+    part = np.where(side > 0, s**6, np.where(side < 0, 1 - (1 - s) ** 6, middle))
+    slope = np.where(side > 0, 6 * s**5, np.where(side < 0, 6 * (1 - s) ** 5, middle_slope))
     return low + span * part, span * slope * ds
 
 

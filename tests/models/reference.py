@@ -311,6 +311,7 @@ CONDITION: defaultdict[str, Callable[..., mpmath.mpf]] = defaultdict(
     lambda: lambda v, wi, wo: mp.mpf(0),
     {
         "lafortune": _lafortune_condition,
+        **reference_microfacet.CONDITION,
         "edwards": _edwards_condition,
         "oren_nayar": _oren_nayar_condition,
         "oren_nayar(energy_preserving)": _oren_nayar_energy_preserving_condition,

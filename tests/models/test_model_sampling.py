@@ -189,7 +189,16 @@ def _quantities(wi: torch.Tensor, wo: torch.Tensor, v: dict[str, torch.Tensor]) 
     cos_d = (h * wo).sum(-1)
     fresnel = _fresnel(cos_d, v)
     side = wi[:, 0] * wo[0] + wi[:, 1] * wo[1]  # cos(phi_i - phi_o) sin theta_i sin theta_o
-    return {"d": cos_d, "h": h[:, 2], "i": wi[:, 2], "o": wo[2].expand(len(wi)), "F": fresnel, "side": side, "wo": wo}
+    return {
+        "d": cos_d,
+        "h": h[:, 2],
+        "i": wi[:, 2],
+        "o": wo[2].expand(len(wi)),
+        "F": fresnel,
+        "side": side,
+        "wi": wi,
+        "wo": wo,
+    }
 
 
 def _eon_weight(q: dict[str, torch.Tensor], v: dict[str, torch.Tensor]) -> torch.Tensor:
@@ -208,8 +217,32 @@ def _eon_weight(q: dict[str, torch.Tensor], v: dict[str, torch.Tensor]) -> torch
     return v["kd"] * a * (1 + r * t) + often * (1 - albedo(q["i"])) * (1 - albedo(q["o"]))
 
 
+def _smith_weight(masking, *, separable=False):
+    """Heitz and d'Eon 2014: F G2 / G1(wo), with G from Lambda as a function of a tan theta."""
+
+    def formula(q: dict[str, torch.Tensor], v: dict[str, torch.Tensor]) -> torch.Tensor:
+        width = torch.stack([v["a"], v["a"]] if "a" in v else [v["ax"], v["ay"]])
+        i, o = (masking((width * q[w][..., :2]).norm(dim=-1) / q[w][..., 2]) for w in ("wi", "wo"))
+        return v["ks"] * q["F"] * (1 / (1 + i) if separable else (1 + o) / (1 + i + o))
+
+    return formula
+
+
+def _ggx_masking(tangent: torch.Tensor) -> torch.Tensor:
+    return (torch.sqrt(1 + tangent**2) - 1) / 2
+
+
+def _beckmann_masking(tangent: torch.Tensor) -> torch.Tensor:
+    a = 1 / tangent.clamp(min=1e-3)
+    return (torch.erf(a) - 1) / 2 + torch.exp(-(a**2)) / (2 * a * math.sqrt(math.pi))
+
+
 # Each paper's own weight f cos_i / pdf for a wi drawn from the lobe; q as _quantities, v the values.
 PAPER_WEIGHT = {
+    "ggx": _smith_weight(_ggx_masking),
+    "ggx(separable)": _smith_weight(_ggx_masking, separable=True),
+    "beckmann": _smith_weight(_beckmann_masking),
+    "beckmann(separable)": _smith_weight(_beckmann_masking, separable=True),
     "lambert": lambda q, v: v["kd"] + 0 * q["i"],
     "coupled_lambert": lambda q, v: v["kd"] * (1 - q["F"]),
     "ashikhmin_shirley_diffuse": lambda q, v: (
