@@ -15,7 +15,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import errors, plots
+    from . import bounds, errors, plots, sampling
     from .fitting import LOSSES, OPTIMIZERS, Fit, Progress, fit
     from .formats import FORMATS, read
     from .formats.samples import QUANTITIES, Samples
@@ -36,11 +36,13 @@ __all__ = [
     "Progress",
     "Samples",
     "__version__",
+    "bounds",
     "errors",
     "fit",
     "material",
     "plots",
     "read",
+    "sampling",
 ]
 
 _MODULES = {
@@ -54,7 +56,7 @@ _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    if name in ("errors", "plots"):
+    if name in ("bounds", "errors", "plots", "sampling"):
         return importlib.import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
