@@ -6,10 +6,7 @@
 FROM python:3.12-slim AS build
 WORKDIR /source
 RUN python -m venv /venv
-# dependencies change less often than the code, so they are a layer of their own
 COPY .ci/constraints.txt .ci/constraints.txt
-RUN /venv/bin/pip install --no-cache-dir -c .ci/constraints.txt \
-    fastapi httpx2 jaxtyping matplotlib numpy pydantic rich torch typer uvicorn
 COPY pyproject.toml README.md LICENSE ./
 COPY brdfcore brdfcore
 COPY service service

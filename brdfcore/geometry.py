@@ -50,10 +50,6 @@ class Geometry(NamedTuple):
     h_dot_wo: Quantity = _NOT_ASKED_FOR  # cosine between half vector and either direction
     over_h_dot_wo: Quantity = _NOT_ASKED_FOR  # its reciprocal
 
-    def detach(self) -> "Geometry":
-        """The same quantities without their history, to be kept."""
-        return Geometry(*(None if value is None else value.detach() for value in self))
-
 
 QUANTITIES = frozenset(Geometry._fields) - {"above"}
 

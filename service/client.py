@@ -115,6 +115,7 @@ class Client:
         gray: Sequence[str] = (),
         per_channel: Sequence[str] = (),
         seed: int = 0,
+        format: str | None = None,  # noqa: A002 - the name that the library and the service use
         quantity: str | None = None,
         angle_unit: str | None = None,
         wait: bool = True,
@@ -122,7 +123,7 @@ class Client:
     ) -> "FitResult":
         """The fit of a model to a measured file, a dataset, arrays by name, or an object like brdfcore.Samples.
 
-        quantity and angle_unit declare what a file or arrays do not say. With wait=True it is finished on return;
+        format, quantity and angle_unit declare what data do not say. With wait=True the fit is finished on return;
         raises FitFailedError, and WaitError after `timeout` s. With wait=False it may still run: see FitResult.wait.
         """
         body: dict[str, Any] = {"model": model, "loss": loss, "optimizer": optimizer, "seed": seed}
@@ -130,7 +131,7 @@ class Client:
         if isinstance(data, DatasetView):
             body["dataset"] = data.id
         elif isinstance(data, str | os.PathLike):
-            body["dataset"] = self.upload(data, quantity=quantity, angle_unit=angle_unit).id
+            body["dataset"] = self.upload(data, format=format, quantity=quantity, angle_unit=angle_unit).id
         else:
             columns = _columns(data, quantity)
             if len(columns["values"]) > INLINE_ROWS:
@@ -267,9 +268,10 @@ class FitResult:
         *,
         scale: str = "linear",
         theta_i_deg: Sequence[float] = (),
+        channel: str | None = None,
     ) -> bytes:
         """The plot of that name, as the bytes of an SVG or PNG file."""
-        asked = {"scale": scale, "theta_i_deg": list(theta_i_deg)}
+        asked = {"scale": scale, "theta_i_deg": list(theta_i_deg)} | ({"channel": channel} if channel else {})
         return self._client._send("GET", f"/v1/fits/{self.id}/plots/{name}.{kind}", params=asked).content
 
 

@@ -156,6 +156,10 @@ class FitOutcome(View):
     errors: dict[str, float | None]
     undetermined: list[str]
     choices: list[str]
+    fixed: list[str]
+    gray: list[str]
+    per_channel: list[str]
+    chi_square: tuple[float, int] | None = Field(description="and its degrees of freedom, where sigma is known")
     cost: CostView
     channels: list[str]
     data: dict[str, Any]

@@ -7,6 +7,8 @@ import pytest
 import torch
 from jaxtyping import install_import_hook
 
+torch.set_num_threads(1)  # the tests' tensors are small, and threads that wait for each other make a busy machine slow
+
 # the shapes that annotations state are checked while tests run; to be installed before the modules are loaded
 install_import_hook(["brdfcore.geometry", "brdfcore.models", "brdfcore.parameters"], "beartype.beartype")
 

@@ -56,15 +56,16 @@ def test_every_setting_is_listed() -> None:
         assert f"`BRDF_{setting.name.upper()}`" in section("HTTP")
 
 
-def test_python_example_prints_what_the_readme_shows(
-    tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("title", ["Python", "Bounds and sampling"])
+def test_python_examples_print_what_the_readme_shows(
+    title: str, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code, shown = re.findall(r"```(?:python|text)\n(.*?)```", section("Python"), re.DOTALL)
+    code, shown = re.findall(r"```(?:python|text)\n(.*?)```", section(title), re.DOTALL)
     (tmp_path / "example.py").write_text(code)
     (tmp_path / "brdfcore").symlink_to(ROOT / "brdfcore")
     monkeypatch.chdir(tmp_path)
     runpy.run_path("example.py")
-    assert (tmp_path / "lobes.svg").exists()
+    assert (tmp_path / "lobes.svg").exists() == ("lobes.svg" in code)
     printed = capsys.readouterr().out
     numbers = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
     assert numbers.sub("#", printed) == numbers.sub("#", shown)

@@ -28,3 +28,9 @@ def main() -> None:
     except BrdfError as error:
         typer.echo(f"brdf: {error}", err=True)
         sys.exit(2)
+    except OSError as error:
+        what = f" {error.filename}" if error.filename else ""
+        typer.echo(
+            f"brdf: Expected to read or write{what}, got: {error.strerror}. Check the path and its rights.", err=True
+        )
+        sys.exit(2)

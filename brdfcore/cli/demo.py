@@ -15,7 +15,10 @@ def command(
     from service.settings import Settings
 
     from ..demo import DATA, MODEL
+    from ..plots import kind_of
     from .serve import background
+
+    kind = kind_of(plot)
 
     with tempfile.TemporaryDirectory() as folder, background(Settings(data=Path(folder), port=0, workers=1)) as url:
         typer.echo(f"Service running at {url}")
@@ -23,5 +26,5 @@ def command(
             typer.echo(f"Posting {DATA.name}, 222 geometries, to be fitted with {MODEL}\n")
             fit = client.fit(DATA, model=MODEL)
             typer.echo(fit.report() + "\n")
-            plot.write_bytes(fit.plot("lobes", plot.suffix.removeprefix(".")))
+            plot.write_bytes(fit.plot("lobes", kind))
     typer.echo(f"Lobe plot written to {plot.resolve()}")

@@ -29,10 +29,14 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Write the lobe plot to this .svg or .png file.")] = None,
     scale: Annotated[str, typer.Option(help="Of the plot's radius: linear, cube_root or log.")] = "linear",
+    channel: Annotated[str | None, typer.Option(help="The channel that is plotted; else the brightest.")] = None,
 ) -> None:
     """Fit a material to a measured file; print parameters with 95 % intervals, errors and cost."""
     import brdfcore as bc
 
+    if plot is not None:  # what cannot be drawn is refused before the work, not after it
+        bc.plots.kind_of(plot)
+        bc.plots.check_scale(scale)
     samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit)
 
     def run(progress: "Callable[[Progress], None] | None") -> "Fit":
@@ -51,7 +55,7 @@ def command(
     result = _with_bar(run)
     typer.echo(json.dumps(result.to_dict(), indent=2) if as_json else result.report())
     if plot is not None:
-        figure = bc.plots.lobes(result.material, samples, scale=scale)
+        figure = bc.plots.lobes(result.material, samples, scale=scale, channel=channel)
         typer.echo(f"Lobe plot: {bc.plots.save(figure, plot)}", err=as_json)
 
 
@@ -83,5 +87,5 @@ def _with_bar(run: "Callable[[Callable[[Progress], None] | None], Fit]") -> "Fit
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("reading", total=1.0, loss="")
+        task = bar.add_task("scan", total=1.0, loss="")
         return run(lambda p: bar.update(task, description=p.stage, completed=p.fraction, loss=f"{p.loss:.6g}"))

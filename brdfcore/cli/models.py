@@ -13,7 +13,7 @@ def command(
     """List the models, or print one whole: equation, source, options and parameters with their boxes."""
     from rich import box
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
 
     from ..errors import unknown_name
     from ..models import MODELS
@@ -26,7 +26,7 @@ def command(
         return
     console = Console(highlight=False)
     if name is None:
-        table = Table("name", "what it is", "options", "parameters", box=box.SIMPLE)
+        table = Table(Column("name", no_wrap=True), "what it is", "options", "parameters", box=box.SIMPLE)
         for model in MODELS.values():
             facts = model.describe()
             options = ", ".join(" | ".join(group) for group in facts["options"])
@@ -37,7 +37,8 @@ def command(
     console.print(facts["text"], markup=False, soft_wrap=True)
     if facts["options"]:
         console.print("\nOptions: " + "; ".join(" | ".join(group) for group in facts["options"]), markup=False)
-    table = Table("parameter", "box", "default", "per channel", "where", "what it is", box=box.SIMPLE)
+    fixed = (Column(name, no_wrap=True) for name in ("parameter", "box", "default"))
+    table = Table(*fixed, "per channel", "where", Column("what it is", overflow="fold"), box=box.SIMPLE)
     for p in facts["parameters"]:
         where = ", ".join(p["where"]) or "always"
         table.add_row(

@@ -24,6 +24,7 @@ def command(
     from service.settings import Settings
 
     settings = Settings.from_environment(host=host, port=port, data=data)
+    settings.data.mkdir(parents=True, exist_ok=True)
     with _bound(settings) as listener:
         typer.echo(f"Service: {_url(listener)}  (its documentation: {_url(listener)}/docs)")
         typer.echo(f"Data:    {settings.data.resolve()}")

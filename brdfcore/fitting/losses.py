@@ -8,7 +8,7 @@
 
 w is the sample's weight, 1 unless the data gives one; the sums run over samples and channels, l2 is the mean over the
 channels. All are sums of squares. root(x) = (x + e)^(1/3) - e^(1/3) with e = 1 % of the median positive c y, which
-bounds the root's slope at zero. A negative y counts as 0 in the last three.
+bounds the root's slope at zero. A negative y counts as 0 in log, in cube_root and in the denominator of relative.
 """
 
 from collections.abc import Callable

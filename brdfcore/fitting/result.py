@@ -26,7 +26,8 @@ class Fit:
 
     parameters, standard_errors: key -> () or (C,); intervals: key -> (2,) or (C, 2), 95 %. NaN stands where there is no
     number to give: in an interval for a value that was fixed or lies on an end of its box, and everywhere for one
-    that the data leave undetermined. `status` is "converged" or "stopped_early", `message` says more.
+    that the data leave undetermined. `objective` is the loss that was minimised: chi-square where the samples' sigma
+    weighed it, else the error of that name. `status` is "converged" or "stopped_early", `message` says more.
     """
 
     material: Material
@@ -40,6 +41,10 @@ class Fit:
     message: str
     undetermined: tuple[str, ...]
     choices: tuple[str, ...]
+    fixed: tuple[str, ...]
+    gray: tuple[str, ...]
+    per_channel: tuple[str, ...]
+    chi_square: tuple[float, int] | None  # with its degrees of freedom, where the samples' sigma is known
     cost: Cost
     channels: tuple[str, ...]
     samples_report: dict[str, Any]
@@ -71,6 +76,10 @@ class Fit:
             "errors": {key: _number(value) for key, value in self.errors.items()},
             "undetermined": list(self.undetermined),
             "choices": list(self.choices),
+            "fixed": list(self.fixed),
+            "gray": list(self.gray),
+            "per_channel": list(self.per_channel),
+            "chi_square": None if self.chi_square is None else list(self.chi_square),
             "cost": vars(self.cost).copy(),
             "channels": list(self.channels),
             "data": self.samples_report,
@@ -87,12 +96,18 @@ def _report(result: dict[str, Any]) -> str:
     lines = [result["model"], f"{result['status'].replace('_', ' ')}: {result['message']}", ""]
     lines.append(f"{'parameter':<32}{'value':>12}  {'95 % interval':<27}what it is")
     for key, value in result["parameters"].items():
+        without = "fixed" if key in result["fixed"] else "none"
+        intervals, what = result["intervals"][key], result["units"].get(key, "")
         if isinstance(value, list):
-            rows = zip(result["channels"], value, result["intervals"][key], strict=True)
-            lines += [_row(f"{key}[{name}]", v, interval, "") for name, v, interval in rows]
+            names = [f"{key}[{name}]" for name in result["channels"]]
+            lines.append(_row(names[0], value[0], intervals[0], without, what))
+            rows = list(zip(names, value, intervals, strict=True))[1:]
+            lines += [_row(name, v, interval, without, "") for name, v, interval in rows]
         else:
-            lines.append(_row(key, value, result["intervals"][key], result["units"][key]))
+            lines.append(_row(key, value, intervals, without, what))
     lines += ["", "errors: " + ", ".join(f"{name} {value:.6g}" for name, value in result["errors"].items())]
+    if result["chi_square"] is not None:
+        lines.append("chi-square {:.6g} for {} degrees of freedom".format(*result["chi_square"]))
     if result["undetermined"]:
         lines.append("not determined by the data: " + ", ".join(result["undetermined"]))
     lines += result["choices"]
@@ -106,9 +121,9 @@ def _report(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _row(key: str, value: float | None, interval: list[float] | None, what: str) -> str:
+def _row(key: str, value: float | None, interval: list[float] | None, without: str, what: str) -> str:
     number = "none" if value is None else f"{value:.6g}"
-    span = "none" if interval is None else f"[{interval[0]:.6g}, {interval[1]:.6g}]"
+    span = without if interval is None else f"[{interval[0]:.6g}, {interval[1]:.6g}]"
     return f"{key:<32}{number:>12}  {span:<27}{what}".rstrip()
 
 

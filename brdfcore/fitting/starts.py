@@ -2,13 +2,15 @@
 
 A Sobol set covers the search ranges of everything but the reflectances that scale a term. At each point f is affine
 in those, f = offset + sum of column * reflectance, and a few sweeps of coordinate descent in their box solve the small
-least-squares problem of each channel. The points with the lowest cosine loss become starts.
+least-squares problem of each channel. The points with the lowest loss become starts: the cosine loss, and the fit's own
+where that is another.
 """
 
 import torch
 from torch import Tensor
 from torch.func import vmap
 
+from .losses import LOSSES
 from .problem import Problem
 
 SCAN_POINTS = 256
@@ -28,17 +30,19 @@ def _scaling_keys(problem: Problem) -> list[str]:
 
 
 def scan(problem: Problem, count: int, seed: int) -> Tensor:
-    """The best `count` raw vectors (S, D) of a seeded scan, and first the text's own start; made under any loss."""
+    """Raw vectors (S, D) to start from: the text's own, then up to twice `count` of a seeded scan's best."""
     own = problem.pack(problem.plan.start)
     linear = _scaling_keys(problem)
     shapes = [key for key in problem.keys if key not in linear]
     points = _points(problem, own, shapes, seed)
-    if not linear:
-        loss = problem.loss(points)
+    if linear:
+        points, cosine = _solve_reflectances(problem, points, linear)
+        chosen = torch.argsort(cosine)[:count]
     else:
-        points, loss = _solve_reflectances(problem, points, linear)
-    order = torch.argsort(loss)[:count]
-    return torch.cat([own.unsqueeze(0), points[order]])
+        chosen = torch.zeros(0, dtype=torch.long)
+    if not linear or problem.loss_kind.difference is not LOSSES["cosine"].difference:
+        chosen = torch.cat([chosen, torch.argsort(problem.loss(points))[:count]]).unique()
+    return torch.cat([own.unsqueeze(0), points[chosen]])
 
 
 def _points(problem: Problem, own: Tensor, shapes: list[str], seed: int) -> Tensor:

@@ -1,10 +1,14 @@
 """What the data determine: standard errors and 95 % intervals of a fit's values, from the Jacobian at the optimum.
 
-    cov = H^-1 M H^-1,  H = J^T J,  M = sum over residuals of variance * (dr/dx)(dr/dx)^T
+    var x_j = sum over residuals of a_ij^2 v_i,   a = J (J^T J)^-1
 
-The variance of a residual follows from the sample's sigma where it is known (then 1.96 standard errors make an
-interval); else it is estimated for each channel from that channel's residuals, and Student's t makes the interval. A
-value stored as its logarithm gets an interval around the logarithm. A value on an end of its box is held there for
+v_i is the variance of residual i. Where the samples' sigma is known it follows from it, and 1.96 standard errors make
+an interval. Where it is not, nothing is assumed of the noise but independence: v_i is estimated by r_i^2 / (1 - h_i)^2
+with the leverage h_i (MacKinnon and White 1985, HC3), and Student's t makes the interval, with the degrees of freedom
+that the few samples a value hangs on leave (Satterthwaite's, as Bell and McCaffrey 2002 use them). Such intervals hold
+for noise that grows with the value, for weights and for samples of weight 0, and are wider than those of a known sigma.
+
+A value stored as its logarithm gets an interval around the logarithm. A value on an end of its box is held there for
 the others and has no interval; a combination of values that the data leave free is named, and none of it gets one.
 """
 
@@ -15,11 +19,12 @@ import torch
 from torch import Tensor
 from torch.func import jvp
 
-from .problem import Problem
+from .problem import Data, Problem
 
 NORMAL_QUANTILE = 1.959963984540054  # leaves 2.5 % above it
 _PRESSED = 1e-7  # cosine between residuals and a column of J below which nothing presses a value against its end
 _RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding: J's own digits, squared
+_ALONE = 1e-9  # a sample with 1 - leverage below this determines a value alone, so its noise cannot be seen
 
 
 @dataclass(frozen=True)
@@ -31,51 +36,60 @@ class Uncertainty:
     high: Tensor  # (D,)
     undetermined: Tensor  # (D,) bool
     held: Tensor  # (D,) bool
+    freedom: int  # residuals that weigh anything, less the values that are free
 
 
 def uncertainty(problem: Problem, x: Tensor) -> Uncertainty:
     """The uncertainties of the optimum x (D,)."""
+    counted = int((problem.data.root_weight.expand_as(problem.data.y) > 0).sum())
     if problem.size == 0:
-        return Uncertainty(x, x, x, x.bool(), x.bool())
+        return Uncertainty(x, x, x, x.bool(), x.bool(), counted)
     gram = problem.gram(x.unsqueeze(0))
-    matrix, meat, freedom = gram.matrix[0], _meat(problem, x), problem.residual_count
+    matrix = gram.matrix[0]
     pressed = gram.gradient[0].abs() > _PRESSED * (matrix.diagonal() * gram.loss).sqrt()
     held = problem.held(x.unsqueeze(0), gram.gradient)[0] & pressed
     undetermined = _undetermined(matrix, held)
-    free = ~(held | undetermined)
-    freedom -= int(free.sum())
-    covariance = torch.full_like(matrix, math.nan)
-    if bool(free.any()) and (freedom > 0 or problem.data.sigma is not None):
-        at = free.nonzero().squeeze(-1)
+    at = (~(held | undetermined)).nonzero().squeeze(-1)
+    error, factor = (torch.full_like(x, math.nan) for _ in range(2))
+    if at.numel() and (counted > at.numel() or problem.data.sigma is not None):
         part = matrix[at][:, at]
         scale = part.diagonal().rsqrt()
-        inverse = torch.linalg.inv(scale.unsqueeze(-1) * part * scale)  # scaled: widths and reflectances differ by 1e4
-        inverse = scale.unsqueeze(-1) * inverse * scale
-        covariance[at.unsqueeze(-1), at] = inverse @ meat[at][:, at] @ inverse
-    error = covariance.diagonal().sqrt()
-    factor = t_quantile(freedom) if problem.data.sigma is None else NORMAL_QUANTILE
-    return Uncertainty(*_natural(problem, x, error, factor), undetermined, held)
+        inverse = torch.zeros_like(matrix)  # scaled while it is inverted: widths and reflectances differ by 1e4
+        scaled = torch.linalg.inv(scale.unsqueeze(-1) * part * scale)
+        inverse[at.unsqueeze(-1), at] = scale.unsqueeze(-1) * scaled * scale
+        variance, freedom = _variances(problem, x, inverse)
+        error[at] = variance[at].sqrt()
+        factor[at] = NORMAL_QUANTILE if problem.data.sigma is not None else t_quantile(freedom[at])
+    return Uncertainty(*_natural(problem, x, error, factor), undetermined, held, counted - at.numel())
 
 
-def _meat(problem: Problem, x: Tensor) -> Tensor:
-    """Sum over residuals of variance (dr/dx)(dr/dx)^T, (D, D)."""
-    channels, names = problem.data.y.shape[1], len(problem.keys)
-    by_channel = torch.zeros(channels, names, names, dtype=torch.float64)
-    squares = torch.zeros(channels, dtype=torch.float64)
-    for data in problem.chunks(channels * (names + 3)):
+def _variances(problem: Problem, x: Tensor, inverse: Tensor) -> tuple[Tensor, Tensor]:
+    """The variance of each raw value, and the degrees of freedom of its estimate, each (D,)."""
+    by_channel = inverse[problem.index]  # (C, P, D)
+    own = torch.stack([inverse[index][:, index] for index in problem.index])  # (C, P, P)
+    variance, even, even_squared = (torch.zeros(problem.size, dtype=torch.float64) for _ in range(3))
+    for data in problem.chunks(problem.data.y.shape[1] * (problem.size + 3 * len(problem.keys))):
         residuals, columns = problem.jacobian(x, data)
+        influence = torch.einsum("ncp,cpd->ncd", columns, by_channel).square()
         if data.sigma is not None:
-            f = problem.f(x, data)
-            ones = torch.ones_like(f)
-            slope = jvp(lambda v, d=data: problem.loss_kind.difference(v, d.y, d.c, problem.scales), (f,), (ones,))[1]
-            columns = columns * (data.root_weight * slope.abs() * data.sigma).unsqueeze(-1)
-        columns = columns.permute(1, 2, 0)
-        by_channel += columns @ columns.transpose(1, 2)
-        squares += residuals.square().sum(0)
-    if problem.data.sigma is None:
-        freedom = problem.data.y.shape[0] - problem.size / channels
-        by_channel *= (squares / max(freedom, 1e-300)).reshape(-1, 1, 1)
-    return problem.scatter_matrix(by_channel.unsqueeze(0))[0]
+            spread = _known_variance(problem, x, data)
+        else:
+            left = 1 - torch.einsum("ncp,cpq,ncq->nc", columns, own, columns)
+            spread = torch.where(left > _ALONE, (residuals / left.clamp(min=_ALONE)).square(), math.inf)
+        touched = influence > 1e-24 * inverse.diagonal()  # an infinite variance concerns only whom it reaches
+        variance += torch.where(touched, influence * spread.unsqueeze(-1), 0.0).sum((0, 1))
+        alike = influence * data.root_weight.square().expand_as(residuals).unsqueeze(-1)  # as if noise were constant
+        even += alike.sum((0, 1))
+        even_squared += alike.square().sum((0, 1))
+    return variance, (even.square() / even_squared.clamp(min=1e-300)).clamp(min=1)
+
+
+def _known_variance(problem: Problem, x: Tensor, data: Data) -> Tensor:
+    """The variances of the residuals (N, C) that follow from the samples' sigma."""
+    f = problem.f(x, data)
+    ones = torch.ones_like(f)
+    slope = jvp(lambda v: problem.loss_kind.difference(v, data.y, data.c, problem.scales), (f,), (ones,))[1]
+    return torch.square(data.root_weight * slope * data.sigma)
 
 
 def _undetermined(matrix: Tensor, held: Tensor) -> Tensor:
@@ -91,47 +105,42 @@ def _undetermined(matrix: Tensor, held: Tensor) -> Tensor:
     return blind
 
 
-def _natural(problem: Problem, x: Tensor, error: Tensor, factor: float) -> tuple[Tensor, Tensor, Tensor]:
-    """Standard errors and interval ends in the parameters' own units, the ends clipped to the box."""
-    standard_error, low, high = error.clone(), x - factor * error, x + factor * error
+def _natural(problem: Problem, x: Tensor, error: Tensor, factor: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Standard errors and interval ends in the parameters' units, the ends clipped to what the box and ties allow."""
+    standard_error = error.clone()
+    low = (x - factor * error).clamp(min=problem.low, max=problem.high)
+    high = (x + factor * error).clamp(min=problem.low, max=problem.high)
     for key, at in problem.slices.items():
-        parameter = problem.plan.form.parameters[key]
-        ends = parameter.ends(torch.float64)
-        if parameter.scale == "log":
+        if problem.plan.form.parameters[key].scale == "log":
             standard_error[at] = error[at] * torch.exp(x[at])
             low[at], high[at] = torch.exp(low[at]), torch.exp(high[at])
-        low[at], high[at] = low[at].clamp(*ends), high[at].clamp(*ends)
     return standard_error, low, high
 
 
-def t_quantile(freedom: int) -> float:
-    """Student's t that leaves 2.5 % above it, for so many degrees of freedom; relative error below 1e-9.
+def t_quantile(freedom: Tensor) -> Tensor:
+    """Student's t that leaves 2.5 % above it, for degrees of freedom from 1 up (any shape); relative error below 1e-9.
 
     From 1000 degrees on by its expansion about the normal quantile (Abramowitz and Stegun 26.7.5), below by bisection
     of the distribution function, whose integral over theta = atan(t / sqrt(freedom)) is smooth.
     """
-    if freedom <= 0:
-        return math.nan
-    if freedom >= 1000:
-        z = NORMAL_QUANTILE
-        expansion = (
-            (z**3 + z) / 4,
-            (5 * z**5 + 16 * z**3 + 3 * z) / 96,
-            (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
-        )
-        return z + math.fsum(term / freedom**k for k, term in enumerate(expansion, start=1))
-    nodes = torch.linspace(0, 1, 2001, dtype=torch.float64)
+    z = NORMAL_QUANTILE
+    expansion = (
+        (z**3 + z) / 4,
+        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
+        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
+    )
+    many = z + sum((term / freedom**k for k, term in enumerate(expansion, start=1)), torch.zeros_like(freedom))
+    few = freedom.clamp(max=1000)
+    nodes = torch.linspace(0, 1, 401, dtype=torch.float64)
     simpson = torch.ones_like(nodes)
     simpson[1:-1:2], simpson[2:-1:2] = 4, 2
-    log_norm = math.lgamma((freedom + 1) / 2) - math.lgamma(freedom / 2) - 0.5 * math.log(math.pi)
-
-    def above_zero(t: float) -> float:
-        end = math.atan(t / math.sqrt(freedom))
-        integrand = torch.exp(log_norm + (freedom - 1) * torch.log(torch.cos(end * nodes)))
-        return float((simpson * integrand).sum()) * end / 6000
-
-    low, high = 1.9, 13.0  # the quantiles of an infinite and of one degree of freedom lie between
-    for _ in range(60):
+    log_norm = torch.lgamma((few + 1) / 2) - torch.lgamma(few / 2) - 0.5 * math.log(math.pi)
+    low, high = torch.full_like(few, 1.9), torch.full_like(few, 13.0)  # of infinitely many degrees, and of one
+    for _ in range(45):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if above_zero(middle) < 0.475 else (low, middle)
-    return 0.5 * (low + high)
+        end = torch.atan(middle / few.sqrt())
+        cosines = torch.cos(end.unsqueeze(-1) * nodes)
+        integrand = torch.exp(log_norm.unsqueeze(-1) + (few.unsqueeze(-1) - 1) * torch.log(cosines))
+        below = (simpson * integrand).sum(-1) * end / 1200 < 0.475
+        low, high = torch.where(below, middle, low), torch.where(below, high, middle)
+    return torch.where(freedom < 1000, 0.5 * (low + high), many)

@@ -65,4 +65,13 @@ def detect(head: bytes) -> str:
             f"Expected the file to be of one format, got {' and '.join(names)}. Pass format.", field="format"
         )
     known = "; ".join(f"{name} ({format_.description})" for name, format_ in FORMATS.items())
-    raise FormatError(f"Expected the file to be of a known format, got none of them. Known: {known}.", field="format")
+    first = next((line for line in head.split(b"\n") if line.strip() and not line.lstrip().startswith(b"#")), b"")
+    text = first.decode("ascii", errors="replace").strip()
+    begins = (
+        f" It begins with {text[:60]!r}; for a table, format='csv' says what its header lacks."
+        if text.isprintable()
+        else ""
+    )
+    raise FormatError(
+        f"Expected the file to be of a known format, got none of them. Known: {known}.{begins}", field="format"
+    )

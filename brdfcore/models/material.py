@@ -119,12 +119,13 @@ class Material(nn.Module):
         A wi may lie below the horizon: its weight is 0 and it must not be drawn again.
         """
         check_directions("wo", wo)
-        if u.ndim == 0 or u.shape[-1] != 3:
+        if not isinstance(u, Tensor) or u.ndim == 0 or u.shape[-1] != 3:
+            got = f"shape {tuple(u.shape)}" if isinstance(u, Tensor) else type(u).__name__
             raise InvalidValueError(
-                f"Expected u to be three numbers on the last axis, got shape {tuple(u.shape)}. Pass u as (..., 3).",
+                f"Expected u to be a tensor of three numbers on the last axis, got {got}. Pass u as (..., 3).",
                 field="u",
             )
-        u = u.to(wo).clamp(max=1 - torch.finfo(wo.dtype).eps / 2)  # rounding to float32 may reach 1
+        u = u.to(wo).clamp(min=0, max=1 - torch.finfo(wo.dtype).eps / 2)  # rounding to float32 may reach 1
         return self.form.sample(self._values_like(wo), wo, u)
 
     def weight(self, wi: Directions, wo: Directions) -> Spectrum:

@@ -39,15 +39,21 @@ def to_bytes(figure: "Figure", kind: Literal["svg", "png"]) -> bytes:
 def save(figure: "Figure", path: str | Path) -> Path:
     """The path of the file that the figure was written to; SVG or PNG by its suffix."""
     path = Path(path)
+    path.write_bytes(to_bytes(figure, kind_of(path)))
+    return path
+
+
+def kind_of(path: Path) -> Literal["svg", "png"]:
+    """The kind of file that a path asks for; InvalidValueError for another suffix or a folder that is missing."""
+    if not path.parent.is_dir():
+        raise InvalidValueError(
+            f"Expected the plot's folder to exist, got {str(path.parent)!r}. Make it first.", field="path"
+        )
     match path.suffix.lower():
         case ".svg":
-            content = to_bytes(figure, "svg")
+            return "svg"
         case ".png":
-            content = to_bytes(figure, "png")
-        case suffix:
-            raise InvalidValueError(
-                f"Expected the plot's file to end in .svg or .png, got {suffix or 'no suffix'!r}. Rename it.",
-                field="path",
-            )
-    path.write_bytes(content)
-    return path
+            return "png"
+    raise InvalidValueError(
+        f"Expected the plot's file to end in .svg or .png, got {path.suffix or 'no suffix'!r}. Rename it.", field="path"
+    )

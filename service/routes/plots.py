@@ -30,6 +30,7 @@ class Lobes(BaseModel):
 
     scale: Literal["linear", "cube_root", "log"] = Field("linear", description="of the radius")
     theta_i_deg: list[Angle] = Field([], max_length=12, description="angles of incidence; the data's, if none")
+    channel: str | None = Field(None, description="which is drawn; the brightest, if none")
 
 
 @router.get("/lobes.svg", response_class=Response, responses=responses(404, 406, 409, 422))
@@ -69,5 +70,7 @@ async def _lobes(request: Request, fit_id: str, asked: Lobes, kind: Kind) -> Res
 def _drawn(service: State, body: bytes, result: str, asked: Lobes, kind: Kind) -> bytes:
     samples = service.datasets.samples(FitRequest.model_validate_json(body))
     material = bc.Material.from_json(FitOutcome.model_validate_json(result).material)
-    figure = plots.lobes(material, samples, theta_i_deg=asked.theta_i_deg or None, scale=asked.scale)
+    figure = plots.lobes(
+        material, samples, theta_i_deg=asked.theta_i_deg or None, scale=asked.scale, channel=asked.channel
+    )
     return plots.to_bytes(figure, kind)

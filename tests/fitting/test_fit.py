@@ -29,9 +29,13 @@ def test_noiseless_data_give_the_parameters_back(three_channels: bc.Samples, los
 
 @pytest.mark.parametrize("optimizer", bc.OPTIMIZERS)
 def test_every_optimizer_reaches_the_same_optimum(optimizer: str) -> None:
+    """The gradient methods begin at the scan's raw points, which lie well above the optimum."""
     samples = measured_from(TRUE, noise=0.01)
+    seen: list[bc.Progress] = []
     best = bc.fit(samples, MODEL).objective
-    fit = bc.fit(samples, MODEL, optimizer=optimizer)
+    fit = bc.fit(samples, MODEL, optimizer=optimizer, progress=seen.append)
+    if optimizer in ("lbfgs", "adam"):
+        assert max(p.loss for p in seen if p.stage == "fit") > 1.05 * best
     assert fit.status == "converged"
     assert fit.objective == pytest.approx(best, rel=1e-8)
     assert fit.cost.optimizer == ("least_squares" if optimizer == "auto" else optimizer)
@@ -187,7 +191,37 @@ def test_progress_rises_to_one(three_channels: bc.Samples) -> None:
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
     assert seen[0].stage == "scan"
-    assert {"starts", "done"} <= {p.stage for p in seen}
+    assert {"fit", "uncertainty", "done"} <= {p.stage for p in seen}
+
+
+def test_the_result_names_what_was_fixed_gray_and_per_channel(three_channels: bc.Samples) -> None:
+    fit = bc.fit(
+        three_channels,
+        "lambert + kurt(isotropic)",
+        fixed={"kurt.alpha": 0.1},
+        gray=["lambert.kd"],
+        per_channel=["kurt.f0"],
+    ).to_dict()
+    assert (fit["fixed"], fit["gray"], fit["per_channel"]) == (["kurt.alpha"], ["lambert.kd"], ["kurt.f0"])
+    (line,) = [line for line in fit["report"].splitlines() if line.startswith("kurt.alpha")]
+    assert "  fixed " in line
+
+
+def test_other_losses_find_the_optimum_that_some_start_finds() -> None:
+    """Starts are ranked under the loss that is minimised, not under the cosine loss alone."""
+    samples = measured_from("coupled_lambert(kd=0.3, f0=kurt.f0) + kurt(isotropic, ks=0.5, f0=0.05, m=0.3)", noise=0.01)
+    text = "coupled_lambert(f0=kurt.f0) + kurt(isotropic{})"
+    found = bc.fit(samples, text.format(""), loss="cube_root").objective
+    by_hand = [bc.fit(samples, text.format(f", m={m}"), loss="cube_root").objective for m in (0.02, 0.1, 0.3, 0.6)]
+    assert found <= 1.0001 * min(by_hand)
+
+
+def test_samples_must_be_samples() -> None:
+    with pytest.raises(
+        BrdfError, match=r"^Expected samples to be Samples, got str\. Make them with bc\.read"
+    ) as caught:
+        bc.fit("garnet_red.brdf", "lambert")
+    assert caught.value.field == "samples"
 
 
 def test_bad_arguments_are_refused_before_work(three_channels: bc.Samples) -> None:

@@ -69,6 +69,26 @@ REFUSED = {
         "lambert.kd",
         "one number, since gray names it",
     ),
+    "gray and per channel": (
+        {"gray": ["kurt.f0"], "per_channel": ["kurt.f0"]},
+        ParameterError,
+        "per_channel",
+        "got it in both",
+    ),
+    "gray as a text": ({"gray": "lambert.kd"}, ParameterError, "gray", "Write ['lambert.kd']"),
+    "fixed text": ({"fixed": {"kurt.f0": "a"}}, ParameterError, "kurt.f0", "to be a number"),
+    "fixed truth": ({"fixed": {"kurt.f0": True}}, ParameterError, "kurt.f0", "to be a number"),
+    "no text": ({"model": None}, ModelTextError, "model", "got NoneType"),
+    "seed": ({"seed": -1}, ParameterError, "seed", "got -1"),
+    "large seed": ({"seed": 10**23}, ParameterError, "seed", "2^63"),
+    "total too large": ({"model": "lambert(kd=3 - kurt.ks) + kurt"}, ParameterError, "lambert.kd", "Change the total"),
+    "fixed beyond its tie": (
+        {"model": "lambert(kd=0.175 - kurt.ks) + kurt", "fixed": {"kurt.ks": 0.5}},
+        ParameterError,
+        "kurt.ks",
+        "fixed within [0, 0.175]",
+    ),
+    "tie of a wrong shape": ({"model": "kurt(m=lambert.kd) + lambert"}, ParameterError, "kurt.m", "one number"),
     "contradiction": ({"model": "kurt(isotropic, mx=0.2)"}, ModelTextError, "model", "Drop one of them"),
 }
 

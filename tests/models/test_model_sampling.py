@@ -406,3 +406,11 @@ def test_directions_below_the_horizon_have_no_density_and_no_weight(choice):
     assert bool(below.any())
     assert bool((material.pdf(wi, wo)[below] == 0).all())
     assert bool((material.weight(wi, wo)[below] == 0).all())
+
+
+@pytest.mark.parametrize("text", ["lambert", "ward", "lambert + ward"])
+def test_one_u_serves_many_directions_and_one_direction_many_u(text):
+    material = bc.material(text)
+    many, one = torch.tensor([[0.6, 0.0, 0.8]]).repeat(5, 1), torch.tensor([0.5, 0.2, 0.7])
+    assert material.sample(many, one).shape == (5, 3)
+    assert material.sample(many[0], one.repeat(5, 1)).shape == (5, 3)

@@ -58,6 +58,18 @@ def test_a_lobe_that_diverges_at_grazing_does_not_set_the_scale() -> None:
     assert axes.get_rmax() < 100
 
 
+def test_a_turned_sample_shows_one_azimuth() -> None:
+    """Points of other azimuths would lie beside a curve that is not theirs."""
+    angles = [0.0, 0.0, 60.0, 60.0, 60.0]
+    values = [1.0, 2.0, 30.0, 40.0, 50.0]
+    samples = bc.Samples.from_angles(
+        [40.0] * 5, angles, [10, 40, 10, 40, 50], [a + 180 for a in angles], values, "degrees"
+    )
+    figure = bc.plots.lobes(bc.material("ward(ax=0.1, ay=0.5)"), samples)
+    assert sorted(figure.axes[0].get_lines()[1].get_ydata()) == [1.0, 2.0]
+    assert any("azimuth 0°" in text.get_text() for text in figure.texts)
+
+
 def test_channel_is_named(linoleum: bc.Samples) -> None:
     colours = bc.Samples(linoleum.wi, linoleum.wo, linoleum.values.expand(-1, 3) * torch.tensor([1.0, 3.0, 2.0]))
     material = bc.material("lambert(kd=[0.1, 0.3, 0.2])")
@@ -91,6 +103,7 @@ def test_texts_do_not_overlap_and_stay_inside(linoleum: bc.Samples) -> None:
 
 
 REFUSED = {
+    "one angle": ({"theta_i_deg": 45}, InvalidValueError, "theta_i_deg"),
     "angle": ({"theta_i_deg": [95]}, InvalidValueError, "theta_i_deg"),
     "no angle": ({"theta_i_deg": []}, InvalidValueError, "theta_i_deg"),
     "scale": ({"scale": "cuberoot"}, UnknownNameError, "scale"),
