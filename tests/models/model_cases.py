@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pytest
 import torch
 
 import brdfcore as bc
@@ -13,6 +14,22 @@ from brdfcore.parameters import Parameter
 
 CHOICES = [choice for model in bc.MODELS.values() for choice in model.with_words(())]
 CHOICE_IDS = [f"{choice.name}({','.join(choice.options)})" for choice in CHOICES]
+
+
+def _covering(model: type[bc.Model]) -> list[bc.Model]:
+    """The fewest choices, found greedily, in which each of the model's words stands at least once."""
+    chosen: list[bc.Model] = []
+    missing = {word for group in model.option_groups for word in group}
+    while missing or not chosen:
+        best = max(model.with_words(()), key=lambda choice: len(missing & set(choice.options)))
+        chosen.append(best)
+        missing -= set(best.options)
+    return chosen
+
+
+_DEFAULT = {choice for model in bc.MODELS.values() for choice in _covering(model)}
+# every choice at the full tier; by default enough of them that each word of each model is tested
+EVERY_CHOICE = [choice if choice in _DEFAULT else pytest.param(choice, marks=pytest.mark.full) for choice in CHOICES]
 DTYPES = (torch.float32, torch.float64)
 
 # One table of tolerances, per dtype.

@@ -9,13 +9,13 @@ import re
 import numpy as np
 import pytest
 import torch
-from model_cases import CHOICE_IDS, CHOICES, corners, draw_values, hemisphere, lobe_pairs, material_of
+from model_cases import CHOICE_IDS, EVERY_CHOICE, corners, draw_values, hemisphere, lobe_pairs, material_of
 from torch import nn
 
 import brdfcore as bc
 from brdfcore.errors import ParameterError, UnknownNameError
 
-every_choice = pytest.mark.parametrize("choice", CHOICES, ids=CHOICE_IDS)
+every_choice = pytest.mark.parametrize("choice", EVERY_CHOICE, ids=CHOICE_IDS)
 TIED = "coupled_lambert(kd=[0.1, 0.2, 0.3], f0=kurt.f0) + kurt(mx=0.1, my=0.3) + lambert(kd=0.5 - kurt.ks)"
 
 

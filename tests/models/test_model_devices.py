@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 import torch
-from model_cases import CHOICE_IDS, CHOICES, DTYPES, EPS, draw_values, lobe_pairs, material_of
+from model_cases import CHOICE_IDS, DTYPES, EPS, EVERY_CHOICE, draw_values, lobe_pairs, material_of
 
 import brdfcore as bc
 
@@ -19,7 +19,7 @@ DEVICES = [
 
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("dtype", DTYPES, ids=["float32", "float64"])
-@pytest.mark.parametrize("choice", CHOICES, ids=CHOICE_IDS)
+@pytest.mark.parametrize("choice", EVERY_CHOICE, ids=CHOICE_IDS)
 def test_results_follow_the_device_of_the_directions(choice, dtype, device):
     rng = np.random.default_rng(71)
     material = material_of(choice, draw_values(choice, rng, where="mild", channels=3))

@@ -10,6 +10,7 @@ from model_cases import (
     CHOICES,
     DTYPES,
     EPS,
+    EVERY_CHOICE,
     SAME,
     draw_value,
     draw_values,
@@ -24,7 +25,7 @@ import brdfcore as bc
 from brdfcore.errors import InvalidValueError
 from brdfcore.geometry import geometry
 
-every_choice = pytest.mark.parametrize("choice", CHOICES, ids=CHOICE_IDS)
+every_choice = pytest.mark.parametrize("choice", EVERY_CHOICE, ids=CHOICE_IDS)
 every_dtype = pytest.mark.parametrize("dtype", DTYPES, ids=["float32", "float64"])
 
 

@@ -9,9 +9,9 @@ import torch
 from model_cases import (
     CEILING,
     CHOICE_IDS,
-    CHOICES,
     DTYPES,
     EPS,
+    EVERY_CHOICE,
     GRADIENT,
     TAIL,
     VALUE,
@@ -27,7 +27,7 @@ from reference import exact, mp
 import brdfcore as bc
 from brdfcore.geometry import FLOOR, geometry
 
-every_choice = pytest.mark.parametrize("choice", CHOICES, ids=CHOICE_IDS)
+every_choice = pytest.mark.parametrize("choice", EVERY_CHOICE, ids=CHOICE_IDS)
 every_dtype = pytest.mark.parametrize("dtype", DTYPES, ids=["float32", "float64"])
 
 

@@ -5,8 +5,8 @@ import reference
 import torch
 from model_cases import (
     CHOICE_IDS,
-    CHOICES,
     DTYPES,
+    EVERY_CHOICE,
     above_horizon,
     corners,
     entry,
@@ -20,7 +20,7 @@ from torch.func import grad, vmap
 import brdfcore as bc
 from brdfcore.geometry import geometry
 
-every_choice = pytest.mark.parametrize("choice", CHOICES, ids=CHOICE_IDS)
+every_choice = pytest.mark.parametrize("choice", EVERY_CHOICE, ids=CHOICE_IDS)
 every_dtype = pytest.mark.parametrize("dtype", DTYPES, ids=["float32", "float64"])
 
 

@@ -9,13 +9,13 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from model_cases import CHOICE_IDS, CHOICES, corners, draw_values, material_of
+from model_cases import CHOICE_IDS, EVERY_CHOICE, corners, draw_values, material_of
 
 import brdfcore as bc
 from brdfcore.errors import BrdfError, ModelTextError, ParameterError, UnknownNameError
 from brdfcore.models.text import Tie, number_text, parse
 
-every_choice = pytest.mark.parametrize("choice", CHOICES, ids=CHOICE_IDS)
+every_choice = pytest.mark.parametrize("choice", EVERY_CHOICE, ids=CHOICE_IDS)
 quickly = settings(max_examples=120, deadline=None, derandomize=True, database=None)
 
 
