@@ -3,10 +3,14 @@
 import os
 import pathlib
 
+import hypothesis
 import pytest
 import torch
 from jaxtyping import install_import_hook
 
+# the same examples every time, however busy the machine is
+hypothesis.settings.register_profile("seeded", derandomize=True, deadline=None)
+hypothesis.settings.load_profile("seeded")
 torch.set_num_threads(1)  # the tests' tensors are small, and threads that wait for each other make a busy machine slow
 
 # the shapes that annotations state are checked while tests run; to be installed before the modules are loaded
