@@ -86,10 +86,20 @@ class _OnDemand:
 
     def __init__(self, wi: Tensor, wo: Tensor, floor: float) -> None:
         self.above = ~((wi[..., 2:] <= 0) | (wo[..., 2:] <= 0))  # a NaN is not below: it goes on as NaN
-        normal = wi.new_tensor([0.0, 0.0, 1.0])
-        self.wi = torch.where(self.above, wi, normal)
-        self.wo = torch.where(self.above, wo, normal)
+        self.given = wi, wo
         self.floor = floor
+
+    @cached_property
+    def normal(self) -> Tensor:
+        return self.given[0].new_tensor([0.0, 0.0, 1.0])
+
+    @cached_property
+    def wi(self) -> Tensor:
+        return torch.where(self.above, self.given[0], self.normal)
+
+    @cached_property
+    def wo(self) -> Tensor:
+        return torch.where(self.above, self.given[1], self.normal)
 
     @property
     def xi(self) -> Tensor:

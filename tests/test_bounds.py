@@ -11,10 +11,11 @@ import brdfcore as bc
 from brdfcore.bounds.pieces import Pieces
 from brdfcore.bounds.terms import fresnel_peak, slopes_peak
 from brdfcore.geometry import from_angles
+from brdfcore.hard_cases import covering
 from brdfcore.models.form import Form, Term
 from brdfcore.models.fresnel import conductor, dielectric
 
-CHOICES = [choice for name in bc.bounds.BOUNDS for choice in bc.MODELS[name].with_words(())]
+CHOICES = [choice for name in bc.bounds.BOUNDS for choice in bc.MODELS[name].choices()]
 IDS = [f"{choice.name}({','.join(choice.options)})" for choice in CHOICES]
 SUMS = [
     "lambert(kd=[0.1, 0.2, 0.3]) + ward(rs=[0.3, 0.2, 0.1], ax=0.1, ay=0.3)",
@@ -103,14 +104,13 @@ def ratios_of_random_boxes(materials: list[bc.Material], boxes: int, seed: int) 
     return ratios
 
 
-def every_material(rounds: int) -> list[bc.Material]:
+def materials_of(choices: list[bc.Model]) -> list[bc.Material]:
     rng = np.random.default_rng(81)
-    drawn = [random_material(choice, rng) for _ in range(rounds) for choice in CHOICES]
-    return drawn + [bc.material(text) for text in SUMS]
+    return [random_material(choice, rng) for choice in choices] + [bc.material(text) for text in SUMS]
 
 
 def test_no_random_box_holds_more_than_its_bound():
-    materials = every_material(1)
+    materials = materials_of([choice for name in bc.bounds.BOUNDS for choice in covering(bc.MODELS[name])])
     ratios = ratios_of_random_boxes(materials, -(-300 // len(materials)), 1)
     assert len(ratios) > 100
     assert np.median(ratios) <= 1.02
@@ -119,7 +119,7 @@ def test_no_random_box_holds_more_than_its_bound():
 @pytest.mark.full
 def test_no_random_box_of_ten_thousand_holds_more_than_its_bound():
     """And how close they are (regression numbers): nine of ten within 1 %, 99 % within 15 %."""
-    materials = every_material(5)
+    materials = materials_of(CHOICES * 5)
     ratios = np.array(ratios_of_random_boxes(materials, -(-10_000 // len(materials)), 2))
     levels = (50, 90, 95, 99)
     print(f"\nbound over maximum, {len(ratios)} boxes:", dict(zip(levels, np.percentile(ratios, levels), strict=True)))
@@ -144,20 +144,23 @@ HARD = [
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=["float32", "float64"])
+@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.full)])
 @pytest.mark.parametrize("text", HARD)
-def test_extreme_widths_and_grazing_light(text, dtype):
+def test_extreme_widths_and_grazing_light(text, count, dtype):
     """Light to 1e-9 above the horizon; rounding of a direction does not lift f above the bound in either precision."""
     rng = np.random.default_rng(5)
-    z = torch.tensor(10 ** rng.uniform(-9, 0, 60))
-    wi = from_angles(torch.acos(z), torch.tensor(rng.uniform(0, 6, 60)))
+    z = torch.tensor(10 ** rng.uniform(-9, 0, count))
+    wi = from_angles(torch.acos(z), torch.tensor(rng.uniform(0, 6, count)))
     wi[:, 2] = z
     wi = wi.to(dtype)
     material = bc.material(text)
-    for low, high in (random_boxes(rng, wi.double()), around_mirror(wi.double()), around_mirror(wi.double(), 1e-4)):
-        bound = bc.bounds.maximum(material, wi, (low, high))
-        assert bound.dtype == dtype
-        assert not bool(bound.isnan().any())
-        assert bool((bound >= dense_maximum(material, wi, low, high, 400)).all())
+    boxes = [random_boxes(rng, wi.double()), around_mirror(wi.double()), around_mirror(wi.double(), 1e-4)]
+    low, high = (torch.cat(ends) for ends in zip(*boxes, strict=True))
+    wi = wi.repeat(3, 1)
+    bound = bc.bounds.maximum(material, wi, (low, high))
+    assert bound.dtype == dtype
+    assert not bool(bound.isnan().any())
+    assert bool((bound >= dense_maximum(material, wi, low, high, 400)).all())
 
 
 # --- tight -----------------------------------------------------------------------------------------------------------
@@ -188,7 +191,7 @@ def ratios_at_the_mirror(text: str, materials: int, each: int) -> torch.Tensor:
 @pytest.mark.parametrize(("text", "bar"), MIRROR_BOXES)
 def test_bounds_of_boxes_at_the_mirror_direction_are_tight(text, bar):
     """Boxes of 5 degrees, widths .05 to .5: median at most 1.5, anisotropic 2; regression: 95 % within 2 %."""
-    ratios = ratios_at_the_mirror(text, 8, 10)
+    ratios = ratios_at_the_mirror(text, 5, 16)
     assert float(ratios.min()) >= 1
     assert float(ratios.median()) <= bar
     assert float(ratios.quantile(0.95)) <= 1.02
@@ -360,16 +363,16 @@ def test_the_unit_of_length_does_not_matter():
 def test_it_is_vectorised_over_light_and_boxes():
     material = bc.material(SUMS[0])
     rng = np.random.default_rng(85)
-    wi = random_wi(rng, 20, lowest=0.1)
+    wi = random_wi(rng, 8, lowest=0.1)
     low, high = random_boxes(rng, wi)
-    bound = bc.bounds.maximum(material, wi.reshape(4, 5, 3), (low.reshape(4, 5, 3), high.reshape(4, 5, 3)))
-    assert bound.shape == (4, 5, 3)
+    bound = bc.bounds.maximum(material, wi.reshape(2, 4, 3), (low.reshape(2, 4, 3), high.reshape(2, 4, 3)))
+    assert bound.shape == (2, 4, 3)
     assert not bound.requires_grad
     alone = torch.stack([bc.bounds.maximum(material, w, (a, b)) for w, a, b in zip(wi, low, high, strict=True)])
-    assert torch.allclose(bound.reshape(20, 3), alone, rtol=1e-12, atol=0)
+    assert torch.allclose(bound.reshape(8, 3), alone, rtol=1e-12, atol=0)
     one_box = bc.bounds.maximum(material, wi, (low[0], high[0]))
     one_light = bc.bounds.maximum(material, wi[0], (low, high))
-    assert one_box.shape == one_light.shape == (20, 3)
+    assert one_box.shape == one_light.shape == (8, 3)
     assert torch.allclose(one_box[0], one_light[0], rtol=1e-12, atol=0)
     assert bc.bounds.maximum(material, wi[:0], (low[0], high[0])).shape == (0, 3)
 
@@ -433,12 +436,12 @@ def test_the_peak_over_a_rectangle_of_slopes_is_the_largest_value(ax, ay, power)
     rng = np.random.default_rng(87)
     model = bc.MODELS["ward"](("anisotropic",))
     values = {"ax": torch.tensor(ax, dtype=torch.float64), "ay": torch.tensor(ay, dtype=torch.float64)}
-    ends = torch.tensor(np.sort(np.exp(rng.uniform(-4, 4, (100, 2, 2)))))
+    ends = torch.tensor(np.sort(np.exp(rng.uniform(-4, 4, (60, 2, 2)))))
     (p2_low, p2_high), (q2_low, q2_high) = (ends[:, k].split(1, dim=-1) for k in (0, 1))
     none = torch.zeros(1)
     pieces = Pieces(none, (none, none), (p2_low, p2_high), (q2_low, q2_high), (none, none), 0.0)
     peak = slopes_peak(model, values, pieces, power)
-    t = torch.linspace(0, 1, 301, dtype=torch.float64) ** 2  # finer where most peaks are
+    t = torch.linspace(0, 1, 151, dtype=torch.float64) ** 2  # finer where most peaks are
     p2, q2 = p2_low + (p2_high - p2_low) * t, q2_low + (q2_high - q2_low) * t
     p2, q2 = p2[:, :, None], q2[:, None, :]
     grid = torch.exp(-p2 / ax**2 - q2 / ay**2) * (1 + p2 + q2) ** power / (math.pi * ax * ay)

@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from . import demo, fit, models, serve
+from . import albedo, check, demo, fit, models, serve
 
 app = typer.Typer(
     name="brdf",
@@ -15,6 +15,8 @@ app = typer.Typer(
 )
 app.command("fit")(fit.command)
 app.command("models")(models.command)
+app.command("albedo")(albedo.command)
+app.command("check")(check.command)
 app.command("serve")(serve.command)
 app.command("demo")(demo.command)
 

@@ -15,31 +15,14 @@ import torch
 from torch import Tensor
 
 from ..geometry import Geometry
-from ..parameters import Parameter, Values
-from ._half_vector import HalfVectorLobe
+from ..parameters import Values
+from ._half_vector import HalfVectorLobe, slope_width
 
 
 class GaussianSlopes(HalfVectorLobe):
     """A half-vector lobe with a Gaussian distribution of slopes; widths are rms slopes times sqrt 2."""
 
-    widths_along = ("a", "ax", "ay")
-
-    @property
-    def width_parameters(self) -> tuple[Parameter, ...]:
-        """The declared width or widths [1], each in [1e-4, 10]."""
-        along = {0: "", 1: " along x", 2: " along y"}
-        return tuple(
-            Parameter(
-                name,
-                0.1,
-                1e-4,
-                10.0,
-                f"root-mean-square slope times sqrt 2{along[self.widths_along.index(name)]} [1]",
-                search=(0.005, 1.5),
-                scale="log",
-            )
-            for name in self.width_names
-        )
+    width = slope_width("root-mean-square slope times sqrt 2")
 
     @property
     def slope_needs(self) -> frozenset[str]:

@@ -5,6 +5,7 @@ y. wi = reflect(wo, h) for a half vector h that is drawn from the lobe whatever 
 """
 
 from abc import abstractmethod
+from dataclasses import replace
 from typing import ClassVar
 
 from torch import Tensor
@@ -16,11 +17,17 @@ from .base import Model
 ISOTROPY = ("isotropic", "anisotropic")
 
 
+def slope_width(description: str) -> Parameter:
+    """A width of a distribution of slopes [1]."""
+    return Parameter("a", 0.1, 1e-4, 10.0, description, search=(0.005, 1.5), scale="log")
+
+
 class WidthLobe(Model):
     """A lobe with one width or two."""
 
     option_groups: ClassVar[tuple[tuple[str, ...], ...]] = (ISOTROPY,)
-    widths_along: ClassVar[tuple[str, str, str]]  # the width's names: isotropic, along x, along y
+    widths_along: ClassVar[tuple[str, str, str]] = ("a", "ax", "ay")  # the width's names: isotropic, along x, along y
+    width: ClassVar[Parameter]  # what they have in common; its description is without the unit
 
     @property
     def anisotropic(self) -> bool:
@@ -37,9 +44,13 @@ class WidthLobe(Model):
         return values[self.width_names[0]], values[self.width_names[-1]]
 
     @property
-    @abstractmethod
     def width_parameters(self) -> tuple[Parameter, ...]:
         """The declared width or widths."""
+        along = dict(zip(self.widths_along, ("", " along x", " along y"), strict=True))
+        return tuple(
+            replace(self.width, name=name, description=f"{self.width.description}{along[name]} [1]")
+            for name in self.width_names
+        )
 
 
 class HalfVectorLobe(WidthLobe):

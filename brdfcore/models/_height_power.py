@@ -30,15 +30,7 @@ class HeightPower(HalfVectorLobe):
     """A power of the half vector's height, whose exponent turns with the azimuth where the lobe is anisotropic."""
 
     widths_along = ("n", "nu", "nv")
-
-    @property
-    def width_parameters(self) -> tuple[Parameter, ...]:
-        """The declared exponent or exponents [1], each in [1, 1e6]."""
-        along = {"n": "", "nu": " along x", "nv": " along y"}
-        return tuple(
-            Parameter(name, 100.0, 1.0, 1e6, f"exponent{along[name]} [1]", search=(1.0, 2e4), scale="log")
-            for name in self.width_names
-        )
+    width = Parameter("n", 100.0, 1.0, 1e6, "exponent", search=(1.0, 2e4), scale="log")
 
     @property
     def power_needs(self) -> frozenset[str]:
@@ -64,7 +56,8 @@ class HeightPower(HalfVectorLobe):
         x, y = torch.sqrt(nv + 1) * torch.cos(t), torch.sqrt(nu + 1) * torch.sin(t)
         norm2 = x.square() + y.square()
         exponent = (nu * x.square() + nv * y.square()) / norm2
-        tangent = torch.sqrt(torch.expm1(-2 * torch.log1p(-u[..., 1:]) / (exponent + 1)))
+        tangent2 = torch.expm1(-2 * torch.log1p(-u[..., 1:]) / (exponent + 1))
+        tangent = torch.sqrt(tangent2.clamp(min=torch.finfo(u.dtype).tiny))  # the root of 0 has no derivative
         norm = torch.sqrt(norm2)
         return tangent * x / norm, tangent * y / norm
 

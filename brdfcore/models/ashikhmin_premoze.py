@@ -4,13 +4,16 @@
     P = E / (pi ax ay cos^3 theta_h),  E = exp(-(p^2/ax^2 + q^2/ay^2))
 
 ks, specular reflectance [1]; ax, ay, root-mean-square slopes times sqrt 2 along x and y [1], or one width a.
-Options: F is `schlick` of f0, Fresnel reflectance at normal incidence [1], `constant` 1, or exact: `dielectric` of eta,
-relative index of refraction [1], or `conductor` of eta and k, its extinction coefficient [1].
+Options: `isotropic` has a, `anisotropic` ax and ay; F is `schlick` of f0, Fresnel reflectance at normal incidence [1],
+`constant` 1, or exact: `dielectric` of eta, relative index of refraction [1], or `conductor` of eta and k, its
+extinction coefficient [1].
+Box: ks, f0 in [0, 1]; a, ax, ay in [1e-4, 10]; eta in [1.0001, 4] (dielectric); eta in [0.01, 20] (conductor);
+k in [0, 20].
 P integrates to 1 over the half vectors' solid angle, so it is the density that the lobe is sampled by, and
 P / cos theta_h is the height field's D.
-Reciprocal; the directional albedo is at most ks: for a narrow lobe about ks F cos theta / (2 - cos theta).
+Reciprocal; the directional albedo is at most ks, and for a narrow lobe ks F cos theta / (2 - cos theta).
 Source: Ashikhmin and Premoze 2007, "Distribution-based BRDFs"; sampled by the slopes, Walter 2005 eqs. 6-9.
-Departure: P is a Gaussian of slopes, where the paper leaves it open; ks scales the whole.
+Departure: P is a Gaussian of slopes, where the paper leaves it open; ks / 4 is in the place of the paper's constant.
 """
 
 from torch import Tensor

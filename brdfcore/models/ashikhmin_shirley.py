@@ -5,19 +5,23 @@
 
 f0, Fresnel reflectance at normal incidence [1] (the paper's Rs, so one a channel); nu, nv, exponents along x and y
 [1], or one exponent n; ks, specular reflectance [1], 1 unless the option `scaled` or `constant` declares it.
-Options: `schlick` is the paper's; `scaled` multiplies it by ks; `constant` replaces F by 1.
-Reciprocal; conserves energy.
+Options: `isotropic` has n, `anisotropic` nu and nv; `schlick` is the paper's lobe, `scaled` multiplies it by ks, and
+`constant` has ks in the place of F.
+Box: f0, ks in [0, 1]; n, nu, nv in [1, 1e6].
+Reciprocal; the directional albedo is at most the largest F, and for a narrow lobe F.
 Source: Ashikhmin and Shirley 2000, technical report eqs. 10, 18; sampling eqs. 20-22 (the journal version lost the
 square root and inverted the density). Departure: hz^(...) is exp(-(nu p^2 + nv q^2)/2 log1p(e2)/e2), exact at h = n and
 for large exponents; the four quadrants of eq. 21 come from one angle of the full circle.
 """
+
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from ..geometry import Geometry
 from ..parameters import Parameter, Values
-from ._fresnel_lobe import F0, FresnelLobe
+from ._fresnel_lobe import F0, KS, FresnelLobe
 from ._half_vector import ISOTROPY
 from ._height_power import HeightPower
 
@@ -34,9 +38,9 @@ class AshikhminShirley(FresnelLobe, HeightPower):
         """The declared reflectances."""
         declared = []
         if "schlick" not in self.options:
-            declared.append(Parameter("ks", 1.0, 0.0, 1.0, "specular reflectance [1]", per_channel="yes"))
+            declared.append(replace(KS, default=1.0))
         if self.fresnel:
-            declared.append(Parameter("f0", F0.default, F0.low, F0.high, F0.description, per_channel="yes"))
+            declared.append(replace(F0, per_channel="yes"))
         return tuple(declared)
 
     @property

@@ -4,6 +4,7 @@
 
 kd, diffuse reflectance [1] (the paper's Rd); f0, the lobe's Fresnel reflectance [1] (the paper's Rs), usually tied:
 `ashikhmin_shirley_diffuse(f0=ashikhmin_shirley.f0)`.
+Box: kd, f0 in [0, 1].
 Reciprocal; the directional albedo is exactly kd (1 - f0) (1 - (1 - cos(theta)/2)^5).
 Source: Ashikhmin and Shirley 2000, technical report eq. 16. Departure: 1 - (1 - x)^5 by its polynomial.
 """

@@ -2,15 +2,16 @@
 
     f(wi, wo) = sum over k of basis_k(shape; wi, wo) * coefficient_k(reflectances)         [1/sr]
 
-The bases are shared by all channels, the coefficients hold the colour, and both are pure functions, so that one small
-matrix product evaluates a material of any number of terms and channels.
+Bases are (..., 1), shared by all channels, and the coefficients hold the colour, so that one small matrix product
+evaluates a material of any number of terms and channels. A basis whose shape has colour itself, through an index of
+refraction with one value a channel, is (..., C). All are pure functions.
 """
 
+import functools
 import inspect
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any, ClassVar
 
 from torch import Tensor
@@ -25,12 +26,14 @@ class Model(ABC):
 
     name: ClassVar[str]
     option_groups: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    apart: ClassVar[tuple[tuple[str, str], ...]] = ()  # pairs of options of which a choice holds one at most
     reciprocal: ClassVar[bool] = True
 
     def __init__(self, options: Sequence[str] = ()) -> None:
         self.options = tuple(
             next((word for word in group if word in options), group[0]) for group in self.option_groups
         )
+        self.check_together(self.options)
 
     def __eq__(self, other: object) -> bool:
         return type(other) is type(self) and other.options == self.options
@@ -63,7 +66,7 @@ class Model(ABC):
 
     @abstractmethod
     def basis(self, values: Values, g: Geometry) -> tuple[Tensor, ...]:
-        """The bases [1/sr], each (..., 1), without their coefficients."""
+        """The bases [1/sr] without their coefficients, each (..., 1), or (..., C) where its shape has colour."""
 
     @abstractmethod
     def coefficients(self, values: Values) -> tuple[Tensor, ...]:
@@ -82,10 +85,27 @@ class Model(ABC):
     def pdf(self, values: Values, g: Geometry) -> Tensor:
         """The density of `sample` per solid angle [1/sr], (..., 1)."""
 
-    @cached_property
+    @functools.cached_property
     def parameter(self) -> dict[str, Parameter]:
         """The declared parameters by name."""
         return {parameter.name: parameter for parameter in self.parameters}
+
+    @classmethod
+    @functools.cache
+    def choices(cls) -> tuple["Model", ...]:
+        """Every choice of options that go together, defaults first."""
+        every = itertools.product(*cls.option_groups)
+        return tuple(cls(words) for words in every if not any(set(pair) <= set(words) for pair in cls.apart))
+
+    @classmethod
+    def check_together(cls, words: Sequence[str]) -> None:
+        """Raise ModelTextError where two of the words do not go together."""
+        for pair in cls.apart:
+            if set(pair) <= set(words):
+                raise ModelTextError(
+                    f"Expected {pair[0]} or {pair[1]} for {cls.name}, got both, which do not go together. Drop one.",
+                    field="model",
+                )
 
     @classmethod
     def with_words(cls, words: Sequence[str], names: Sequence[str] = ()) -> list["Model"]:
@@ -104,7 +124,8 @@ class Model(ABC):
                     f"Expected one of {', '.join(group)} for {cls.name}, got {' and '.join(chosen)}. Keep one.",
                     field="model",
                 )
-        choices = [cls(choice) for choice in itertools.product(*cls.option_groups)]
+        cls.check_together(words)
+        choices = cls.choices()
         known = list(dict.fromkeys(name for choice in choices for name in choice.parameter))
         for name in names:
             if name not in known:
@@ -125,35 +146,43 @@ class Model(ABC):
 
     @classmethod
     def describe(cls) -> dict[str, Any]:
-        """What the model is, as JSON-able facts taken from its file and its declarations."""
+        """What the model is, as JSON-able facts taken from its file and its declarations.
+
+        A parameter that options declare differently has an entry for each declaration. Its `where` holds the words that
+        declare it, any one of those that exclude each other; where it is empty, all do.
+        """
         text = inspect.getdoc(inspect.getmodule(cls)) or ""
-        choices = [cls(choice) for choice in itertools.product(*cls.option_groups)]
-        declared: dict[str, dict[str, Any]] = {}
-        for choice in choices:
-            for p in choice.parameters:
-                entry = declared.setdefault(
-                    p.name,
-                    {
-                        "name": p.name,
-                        "description": p.description,
-                        "box": p.box,
-                        "low": p.low,
-                        "high": p.high,
-                        "default": p.default,
-                        "scale": p.scale,
-                        "per_channel": p.per_channel,
-                        "where": [],
-                    },
-                )
-                entry["where"].append(list(choice.options))
-        for entry in declared.values():  # the words without which the parameter is not declared
-            common = set.intersection(*(set(where) for where in entry["where"])) if cls.option_groups else set()
-            entry["where"] = [w for w in entry["where"][0] if w in common]
+        declared = dict.fromkeys(p for choice in cls.choices() for p in choice.parameters)
         return {
             "name": cls.name,
             "summary": text.partition("\n")[0],
             "text": text,
             "options": [list(group) for group in cls.option_groups],
-            "parameters": list(declared.values()),
+            "parameters": [
+                {
+                    "name": p.name,
+                    "description": p.description,
+                    "box": p.box,
+                    "low": p.low,
+                    "high": p.high,
+                    "default": p.default,
+                    "scale": p.scale,
+                    "per_channel": p.per_channel,
+                    "where": cls._where(p),
+                }
+                for p in declared
+            ],
             "reciprocal": cls.reciprocal,
         }
+
+    @classmethod
+    def _where(cls, parameter: Parameter) -> list[str]:
+        """The words that declare a parameter, of those groups without which others would be told to declare it."""
+        declaring = [choice for choice in cls.choices() if parameter in choice.parameters]
+        words = {word for choice in declaring for word in choice.options}
+        groups = list(cls.option_groups)
+        for group in cls.option_groups:
+            fewer = [other for other in groups if other is not group]
+            told = [c for c in cls.choices() if all(words & set(c.options) & set(other) for other in fewer)]
+            groups = fewer if told == declaring else groups
+        return [word for group in groups for word in group if word in words]

@@ -4,15 +4,21 @@
     G1(w) = 2 / (1 + erf(1/r) + r exp(-1/r^2) / sqrt(pi)),  r^2 = (ax^2 x^2 + ay^2 y^2) / z^2
 
 ks, specular reflectance [1]; ax, ay, root-mean-square slopes times sqrt 2 along x and y [1], or one width a.
-Options: G2 is `correlated` over height, 1 / (1/G1(wi) + 1/G1(wo) - 1), or `separable`, G1(wi) G1(wo), which is never
-larger; F is `schlick` of f0, Fresnel reflectance at normal incidence [1], `constant` 1, or exact: `dielectric` of eta,
-relative index of refraction [1], or `conductor` of eta and k, its extinction coefficient [1].
+Options: `isotropic` has a, `anisotropic` ax and ay; G2 is `correlated` over height, 1 / (1/G1(wi) + 1/G1(wo) - 1), or
+`separable`, G1(wi) G1(wo), which is never larger; F is `schlick` of f0, Fresnel reflectance at normal incidence [1],
+`constant` 1, or exact: `dielectric` of eta, relative index of refraction [1], or `conductor` of eta and k, its
+extinction coefficient [1]; `single` is the scattering by one facet that the equation is, `compensated`, which an
+isotropic lobe can be, adds ks F_back G(ci) G(co) / (pi Gbar), what that loses (_compensation.py).
+Box: ks, f0 in [0, 1]; a, ax, ay in [1e-4, 10]; eta in [1.0001, 4] (dielectric); eta in [0.01, 20] (conductor);
+k in [0, 20].
 Reciprocal; the directional albedo is at most ks, and falls as the lobe gets rough: what the microfacets reflect more
-than once is missing.
+than once is missing. `compensated`, it is at most 1.00002 ks, and where F = 1 it is ks to 2e-5 at every angle and width
+(tests/models/test_compensation.py).
 Source: Beckmann and Spizzichino 1963; Smith 1967; Walter, Marschner, Li and Torrance 2007, eqs. 25, 26; Heitz 2014,
-eqs. 83, 98, 99; sampling of visible normals: Heitz and d'Eon 2014, and the inversion's start by Jakob 2014.
+eqs. 83, 98, 99; sampling of visible normals: Heitz and d'Eon 2014, and the inversion's start by Jakob 2014;
+compensation: Kulla and Conty 2017.
 Departure: Smith's own G1 where others take Walter's rational fit of it; the inversion is solved to 1e-12 of the
-cumulative distribution by a fixed number of steps.
+cumulative distribution by a fixed number of steps; what is lost is read from a table.
 """
 
 import math
@@ -44,6 +50,12 @@ class Beckmann(SmithLobe, GaussianSlopes):
         """E (1 + e2)^2 [1], (..., 1)."""
         root = torch.exp(-0.5 * self.exponent(values, g)) * (1 + g.e2)  # squared only here: (1 + e2)^2 could overflow
         return root.square()
+
+    def fading(self, mu: Tensor, a: Tensor) -> Tensor:
+        """exp(-m / a^2) [1], m about the least sum of squared slopes, h's and wi's cotangent, that lose light."""
+        mu2 = mu * mu
+        mu4 = mu2 * mu2
+        return torch.exp(-(mu2 * (0.2 + 0.1 * mu2) + 0.19 * mu4 * mu4 * mu4) / (a * a))
 
     def seen(self, z: Tensor, stretched2: Tensor) -> Tensor:
         """(z erf(z/s) + s exp(-z^2/s^2) / sqrt(pi)) / 2 [1] for s^2 = ax^2 x^2 + ay^2 y^2."""

@@ -3,7 +3,8 @@
     f(wi, wo) = ks (n+2) / (8 pi) hz^n                                                      [1/sr]
 
 ks, specular reflectance [1]; n, exponent [1].
-Reciprocal; the directional albedo is below ks: for a narrow lobe about ks cos^2 theta.
+Box: ks in [0, 1]; n in [1, 1e6].
+Reciprocal; the directional albedo is below ks, and for a narrow lobe ks cos^2 theta.
 Source: Blinn 1977, "Models of light reflection for computer synthesized pictures"; sampled by the density
 (n+1)/(2 pi) hz^n of the half vector, Ashikhmin and Shirley 2000, technical report eqs. 20-22. Departure: the factor
 (n+2)/(8 pi) is the usual normalisation, not Blinn's; hz^n is exp(-n/2 log1p(e2)).

@@ -7,7 +7,8 @@
 ks, specular reflectance [1]; a, root-mean-square slope times sqrt 2 [1] (the paper's m).
 Options: F is `schlick` of f0, Fresnel reflectance at normal incidence [1], `constant` 1, or exact, as in the paper:
 `dielectric` of eta, relative index of refraction [1], or `conductor` of eta and k, its extinction coefficient [1].
-Reciprocal; the directional albedo is at most ks.
+Box: ks, f0 in [0, 1]; a in [1e-4, 10]; eta in [1.0001, 4] (dielectric); eta in [0.01, 20] (conductor); k in [0, 20].
+Reciprocal; the directional albedo is at most ks, since grooves reflect no more than meets them.
 Source: Cook and Torrance 1982, "A reflectance model for computer graphics" (1981 at SIGGRAPH); sampled by the slopes,
 Walter 2005 eqs. 6-9. Departure: 1/4 for the paper's 1/pi, so that ks F is what a facet reflects. G / (ci co) is
 min(1/(ci co), 4 / (Hz (1 + e2) max(ci, co))), so nothing is lost at the horizon.

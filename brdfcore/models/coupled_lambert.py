@@ -3,6 +3,7 @@
     f(wi, wo) = kd (1 - F) / pi = kd (1 - f0) (1 - (1 - h.wo)^5) / pi         [1/sr]
 
 kd, diffuse reflectance [1]; f0, the lobe's Fresnel reflectance [1], usually tied: `coupled_lambert(f0=kurt.f0)`.
+Box: kd, f0 in [0, 1].
 Reciprocal; the directional albedo is below kd (1 - f0).
 Source: Kurt, Szirmay-Kalos and Krivanek 2010, eq. 13. Departure: 1 - s by its polynomial, exact where h.wo goes to 0.
 """

@@ -1,12 +1,16 @@
 """Edwards's halfway-vector disk, in its energy-conserving form with a lump of finite extent.
 
     f(wi, wo) = ks L co^2 / (4 ci (h.wo) hz^3)                                              [1/sr]
-    L = (n+1) / (pi rx ry) max(1 - (sx/rx)^2 - (sy/ry)^2, 0)^n,  (sx, sy) = co (p, q) on the unit disk
+    L = (n+1) / (pi rx ry) max(1 - (sx/rx)^2 - (sy/ry)^2, 0)^n,  (sx, sy) = co (p, q)
+
+The half vector, scaled to the height of wo, ends at (sx, sy, co): for every wi above the horizon within the unit disk
+around the end of wo. The lump L lies at that plane's centre, where h is the normal, and integrates to 1.
 
 ks, specular reflectance [1]; rx, ry, the lump's radii along x and y on the disk [1] (`ry=edwards.rx` ties them for an
 isotropic lobe); n, exponent of the lump's fall to its rim [1].
-Not reciprocal: the disk is the viewer's. The directional albedo is ks at normal incidence, where the disk holds the
-whole lump, and about ks/2 at grazing, where the horizon cuts it. Every sample weighs ks.
+Box: ks in [0, 1]; rx, ry in [1e-4, 1]; n in [1, 1e6].
+Not reciprocal: the disk is the viewer's. The directional albedo is at most ks: ks at normal incidence, where the disk
+holds the whole lump, and for a narrow one ks/2 at grazing, where the horizon halves it. Every sample weighs ks.
 Source: Edwards, Boulos, Johnson, Shirley, Ashikhmin, Stark and Wyman 2006, "The halfway vector disk for BRDF modeling",
 ACM Transactions on Graphics 25(1). Departure: none; 4 (h.wo) hz^3 is 2 Hz / (1 + e2), so that nothing is lost at the
 horizon.
@@ -61,7 +65,8 @@ class Edwards(ScaledLobe):
 
     def sample(self, values: Values, wo: Tensor, u: Tensor) -> Tensor:
         """Directions wi (..., 3); one below the horizon is part of the density's lost share and weighs 0."""
-        radius = torch.sqrt(-torch.expm1(torch.log1p(-u[..., :1]) / (values["n"] + 1)))
+        radius2 = -torch.expm1(torch.log1p(-u[..., :1]) / (values["n"] + 1))
+        radius = torch.sqrt(radius2.clamp(min=torch.finfo(u.dtype).tiny))  # the root of 0 has no derivative
         t = 2 * math.pi * u[..., 1:]
         across = radius / wo[..., 2:].clamp(min=FLOOR[wo.dtype])
         return reflect(wo, values["rx"] * across * torch.cos(t), values["ry"] * across * torch.sin(t))

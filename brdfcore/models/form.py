@@ -19,6 +19,7 @@ from ..errors import ModelTextError, unknown_name
 from ..geometry import Geometry
 from ..parameters import Parameter, Values
 from . import MODELS, Model
+from .presets import PRESETS
 from .text import ParsedTerm, Tie, number_text
 
 
@@ -159,7 +160,7 @@ class Form:
     def pdf(self, values: Values, g: Geometry) -> Density:
         """The density of `sample` per solid angle [1/sr], (...); its integral falls short of 1 by what is lost."""
         densities = [term.model.pdf(self.of_term(term, values), g) for term in self.terms]
-        total = _columns(densities) @ self.shares(values)
+        total = densities[0].squeeze(-1) if len(densities) == 1 else _columns(densities) @ self.shares(values)
         return torch.where(g.above.squeeze(-1), total, 0.0)
 
     def sample(self, values: Values, wo: Directions, u: Directions) -> Directions:
@@ -167,6 +168,8 @@ class Form:
         normal = wo.new_tensor([0.0, 0.0, 1.0])
         wo, u = torch.broadcast_tensors(torch.where(wo[..., 2:] > 0, wo, normal), u)
         drawn = [term.model.sample(self.of_term(term, values), wo, u[..., 1:]) for term in self.terms]
+        if len(drawn) == 1:
+            return drawn[0]
         upper = self.shares(values).cumsum(0)
         wi = drawn[-1]
         for index in range(len(drawn) - 2, -1, -1):
@@ -228,6 +231,8 @@ def build(
     left_open: dict[str, tuple[str, ...]] = {}
     for term in parsed:
         if term.name not in MODELS:
+            if len(parsed) == 1 and term.bare:
+                raise unknown_name("a model or preset", term.name, [*MODELS, *PRESETS], field="model")
             raise unknown_name("a model", term.name, MODELS, field="model")
         seen[term.name] += 1
         label = term.name if seen[term.name] == 1 else f"{term.name}_{seen[term.name]}"

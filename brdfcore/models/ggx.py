@@ -5,14 +5,20 @@
 
 ks, specular reflectance [1]; ax, ay, widths of the distribution of slopes along x and y [1], or one width a: the slope
 at which D cos^4 theta_h falls to a quarter of its peak.
-Options: G2 is `correlated` over height, 1 / (1/G1(wi) + 1/G1(wo) - 1), or `separable`, G1(wi) G1(wo), which is never
-larger; F is `schlick` of f0, Fresnel reflectance at normal incidence [1], `constant` 1, or exact: `dielectric` of eta,
-relative index of refraction [1], or `conductor` of eta and k, its extinction coefficient [1].
+Options: `isotropic` has a, `anisotropic` ax and ay; G2 is `correlated` over height, 1 / (1/G1(wi) + 1/G1(wo) - 1), or
+`separable`, G1(wi) G1(wo), which is never larger; F is `schlick` of f0, Fresnel reflectance at normal incidence [1],
+`constant` 1, or exact: `dielectric` of eta, relative index of refraction [1], or `conductor` of eta and k, its
+extinction coefficient [1]; `single` is the scattering by one facet that the equation is, `compensated`, which an
+isotropic lobe can be, adds ks F_back G(ci) G(co) / (pi Gbar), what that loses (_compensation.py).
+Box: ks, f0 in [0, 1]; a, ax, ay in [1e-4, 10]; eta in [1.0001, 4] (dielectric); eta in [0.01, 20] (conductor);
+k in [0, 20].
 Reciprocal; the directional albedo is at most ks, and falls as the lobe gets rough: what the microfacets reflect more
-than once is missing.
+than once is missing. `compensated`, it is at most 1.00002 ks, and where F = 1 it is ks to 2e-5 at every angle and width
+(tests/models/test_compensation.py).
 Source: Trowbridge and Reitz 1975; Walter, Marschner, Li and Torrance 2007, eqs. 33, 34; Heitz 2014, eqs. 85, 98, 99;
-sampling of visible normals by spherical caps: Dupuy and Benyoub 2023. Departure: D is evaluated from the
-unit half vector's components, so it stays exact to the horizon.
+sampling of visible normals by spherical caps: Dupuy and Benyoub 2023; compensation: Kulla and Conty 2017.
+Departure: D is evaluated from the unit half vector's components, so it stays exact to the horizon; what is lost is read
+from a table.
 """
 
 import math
@@ -21,7 +27,8 @@ import torch
 from torch import Tensor
 
 from ..geometry import Geometry
-from ..parameters import Parameter, Values
+from ..parameters import Values
+from ._half_vector import slope_width
 from ._smith import SmithLobe
 
 
@@ -29,30 +36,17 @@ class Ggx(SmithLobe):
     """A lobe with long tails."""
 
     name = "ggx"
-    widths_along = ("a", "ax", "ay")
+    width = slope_width("width of the distribution of slopes")
     normal_needs = frozenset({"ux", "uy", "uz"})
-
-    @property
-    def width_parameters(self) -> tuple[Parameter, ...]:
-        """The declared width or widths [1], each in [1e-4, 10]."""
-        along = {"a": "", "ax": " along x", "ay": " along y"}
-        return tuple(
-            Parameter(
-                name,
-                0.1,
-                1e-4,
-                10.0,
-                f"width of the distribution of slopes{along[name]} [1]",
-                search=(0.005, 1.5),
-                scale="log",
-            )
-            for name in self.width_names
-        )
 
     def normals(self, values: Values, g: Geometry) -> Tensor:
         """1 / (uz^2 + ux^2/ax^2 + uy^2/ay^2)^2 [1] for the unit half vector u, (..., 1)."""
         ax, ay = self.widths(values)
         return (g.uz.square() + (g.ux / ax).square() + (g.uy / ay).square()).reciprocal().square()
+
+    def fading(self, mu: Tensor, a: Tensor) -> Tensor:
+        """(a / (mu + a))^2 [1]: the tail of the distribution."""
+        return (a / (mu + a)).square()
 
     def seen(self, z: Tensor, stretched2: Tensor) -> Tensor:
         """sqrt(z^2 + ax^2 x^2 + ay^2 y^2) / 2 [1]."""

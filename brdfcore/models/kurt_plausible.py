@@ -4,9 +4,13 @@
     D = E / (pi mx my cos^4 theta_h),  E = exp(-(p^2/mx^2 + q^2/my^2))
 
 ks, specular reflectance [1]; mx, my, root-mean-square slopes times sqrt 2 along x and y [1], or one width m.
-Options: F is `schlick` of f0, Fresnel reflectance at normal incidence [1], as in the paper, `constant` 1, or exact:
-`dielectric` of eta, relative index of refraction [1], or `conductor` of eta and k, its extinction coefficient [1].
-Reciprocal. The paper calls it physically plausible; for rough lobes it is not (directional albedo 1.04 at m = 2).
+Options: `isotropic` has m, `anisotropic` mx and my; F is `schlick` of f0, Fresnel reflectance at normal incidence [1],
+as in the paper, `constant` 1, or exact: `dielectric` of eta, relative index of refraction [1], or `conductor` of eta
+and k, its extinction coefficient [1].
+Box: ks, f0 in [0, 1]; m, mx, my in [1e-4, 10]; eta in [1.0001, 4] (dielectric); eta in [0.01, 20] (conductor);
+k in [0, 20].
+Reciprocal. The paper calls it physically plausible; for rough lobes it is not: from m = 1.9 the directional albedo
+exceeds ks towards grazing (1.04 ks at m = 2, 4.5 ks at m = 10).
 Source: SIGGRAPH Computer Graphics 44(1), 2010, eq. 9; sampling eqs. 16-19. Departure: evaluated from slopes.
 """
 

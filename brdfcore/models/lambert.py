@@ -2,8 +2,9 @@
 
     f(wi, wo) = kd / pi                                                       [1/sr]
 
-kd, diffuse reflectance [1]; the directional albedo is kd from every direction.
-Reciprocal; conserves energy in its whole box.
+kd, diffuse reflectance [1].
+Box: kd in [0, 1].
+Reciprocal; the directional albedo is kd from every direction.
 Source: Lambert 1760, Photometria. Departure: none.
 """
 

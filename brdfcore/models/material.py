@@ -195,6 +195,6 @@ def _tie(tie: object) -> Tie:
 
 
 def material(text: str) -> Material:
-    """The material that a text describes, as in "lambert(kd=0.17) + ward_bounded(isotropic, rs=0.05, a=0.03)"."""
+    """The material of a text, as in "lambert(kd=0.17) + ward_bounded(isotropic, rs=0.05, a=0.03)", or of a preset."""
     form, values, _ = build(parse(text))
     return Material(form, values)

@@ -11,13 +11,17 @@
                                            + 2/3 tan theta (1 - sin^3 theta)
 
 kd, diffuse reflectance [1] (of one facet, once, where energy-preserving); sigma, standard deviation of the facets'
-slope angle [rad]. Options: `qualitative` (1994, single reflection), `energy_preserving` (2025, all reflections).
-Reciprocal; sigma = 0 is Lambert's. Qualitative, it loses energy as it gets rougher; energy-preserving, the directional
-albedo is kd E + kd' (1 - E), which is 1 for kd = 1.
+slope angle [rad].
+Options: `qualitative` (1994, single reflection), `energy_preserving` (2025, all reflections).
+Box: kd in [0, 1]; sigma in [0, pi/2].
+Reciprocal; sigma = 0 is Lambert's. Qualitative, the directional albedo falls from kd (A + B/2) at grazing to kd A at
+normal incidence: below sigma = 0.326 it exceeds kd towards grazing, by 1.5 % at sigma = 0.2; rougher, it loses up to
+44 %. Energy-preserving, it is kd E + kd' (1 - E), at most kd, and 1 for kd = 1.
 Source: Oren and Nayar 1994, "Generalization of Lambert's reflectance model", eq. 30; Portsmouth, Kutz and Hill 2025,
 "EON: A practical energy-preserving rough diffuse BRDF", Journal of Computer Graphics Techniques 14(1), listing 1 with
-the exact E, after Fujii's t. Departure: cosine-sampled, without their clipped linear transform; 1 - E is evaluated so
-that nothing cancels towards grazing, where it goes to 0 like cos theta, so their epsilons are gone.
+the exact E, after Fujii's t. Departure: r, a roughness in [0, 1] in that paper, is tied to sigma so that both forms
+share one box; cosine-sampled, without their clipped linear transform; 1 - E is evaluated so that nothing cancels
+towards grazing, where it goes to 0 like cos theta, so their epsilons are gone.
 """
 
 import math

@@ -8,13 +8,15 @@
               | NAME "=" LABEL "." NAME             a tie: the other term's parameter serves here too
               | NAME "=" number-or-list "-" LABEL "." NAME   a tie to a known total, as kd = rho - rs
 
-Labels are the models' names; the second `kurt` of a material is `kurt_2`. What the names mean is form.py's affair.
+Labels are the models' names; the second `kurt` of a material is `kurt_2`. What the names mean is form.py's affair, but
+for one: a text that is the bare name of a preset is read as the preset's text.
 """
 
 import re
 from dataclasses import dataclass
 
 from ..errors import ModelTextError
+from .presets import PRESETS
 
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*)|(?P<mark>[-+(),=\[\].]))"
@@ -40,6 +42,11 @@ class ParsedTerm:
     name: str
     words: tuple[str, ...]
     arguments: dict[str, Argument]
+
+    @property
+    def bare(self) -> bool:
+        """Whether it is a name and nothing else."""
+        return not self.words and not self.arguments
 
 
 class _Reader:
@@ -118,14 +125,22 @@ class _Reader:
 
 
 def parse(text: str) -> list[ParsedTerm]:
-    """The terms that the text names; raises ModelTextError where it is no material's text."""
+    """The terms that the text, or the preset that it names, consists of; raises ModelTextError where it is neither."""
     reader = _Reader(text)
     terms = [reader.term()]
     while reader.take("mark", "+"):
         terms.append(reader.term())
     if text[reader.at :].strip():
         raise reader.fail("'+' or the end")
-    return terms
+    preset = next((PRESETS[term.name] for term in terms if term.name in PRESETS), None)
+    if preset is None:
+        return terms
+    if len(terms) > 1 or not terms[0].bare:
+        raise ModelTextError(
+            f"Expected the preset {preset.name} to stand alone, got {text!r}. Write its text instead: {preset.text!r}.",
+            field="model",
+        )
+    return parse(preset.text)
 
 
 def number_text(values: tuple[float, ...] | float) -> str:

@@ -124,7 +124,7 @@ def test_models_lists_the_registry(run: Run) -> None:
     ):
         assert part in one
     described = json.loads(run("models", "--json").stdout)
-    assert [entry["name"] for entry in described] == list(bc.MODELS)
+    assert [entry["name"] for entry in described["items"]] == list(bc.MODELS)
 
 
 def test_help_loads_no_torch() -> None:

@@ -1,7 +1,6 @@
 """What the shared model tests are run over: every model with every choice of options, drawn values, hard directions."""
 
 import itertools
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,57 +8,41 @@ import pytest
 import torch
 
 import brdfcore as bc
-from brdfcore.models.form import Form, Term
+from brdfcore.hard_cases import covering
+from brdfcore.hard_cases.catalogue import form_of
 from brdfcore.parameters import Parameter
 
-CHOICES = [choice for model in bc.MODELS.values() for choice in model.with_words(())]
-CHOICE_IDS = [f"{choice.name}({','.join(choice.options)})" for choice in CHOICES]
+
+def name_of(choice: bc.Model) -> str:
+    """A test's id."""
+    return f"{choice.name}({','.join(choice.options)})"
 
 
-def _covering(model: type[bc.Model]) -> list[bc.Model]:
-    """The fewest choices, found greedily, in which each of the model's words stands at least once."""
-    chosen: list[bc.Model] = []
-    missing = {word for group in model.option_groups for word in group}
-    while missing or not chosen:
-        best = max(model.with_words(()), key=lambda choice: len(missing & set(choice.options)))
-        chosen.append(best)
-        missing -= set(best.options)
-    return chosen
-
-
-_DEFAULT = {choice for model in bc.MODELS.values() for choice in _covering(model)}
+CHOICES = [choice for model in bc.MODELS.values() for choice in model.choices()]
+CHOICE_IDS = [name_of(choice) for choice in CHOICES]
+COVERING = [choice for model in bc.MODELS.values() for choice in covering(model)]
 # every choice at the full tier; by default enough of them that each word of each model is tested
-EVERY_CHOICE = [choice if choice in _DEFAULT else pytest.param(choice, marks=pytest.mark.full) for choice in CHOICES]
+EVERY_CHOICE = [choice if choice in COVERING else pytest.param(choice, marks=pytest.mark.full) for choice in CHOICES]
 DTYPES = (torch.float32, torch.float64)
+
+
+def counted(few: int, many: int) -> list[Any]:
+    """(choice, count) for tests that cost much a case: `few` for the covering choices, `many` for all at full."""
+    by_default = [pytest.param(choice, few, id=name_of(choice)) for choice in COVERING]
+    in_full = [pytest.param(choice, many, id=f"{name_of(choice)}-full", marks=pytest.mark.full) for choice in CHOICES]
+    return by_default + in_full
+
 
 # One table of tolerances, per dtype.
 EPS = {torch.float32: 2.0**-23, torch.float64: 2.0**-52}
-# A value: relative error <= VALUE * max(Q, 8) * eps for Q = -ln(exponential) <= 20, TAIL * Q * eps beyond.
-VALUE = 4
-TAIL = 6
-# Where a lobe alone, before its reflectance scales it down, overflows, it stops at the largest number.
-CEILING = {dtype: 0.99 * torch.finfo(dtype).max for dtype in DTYPES}
-# A gradient: error relative to the largest component of its group <= GRADIENT * max(Q, 8) * eps.
-GRADIENT = 8
 # Two ways round the same arithmetic (reciprocity, channels, devices): a few roundings.
 SAME = 32
-
-
-def form_of(choice: bc.Model) -> Form:
-    """A material's structure of this one term."""
-    return Form((Term(choice.name, choice),))
 
 
 def material_of(choice: bc.Model, values: dict[str, object] | None = None) -> bc.Material:
     """A material of this one term, with values by parameter name."""
     given = {f"{choice.name}.{name}": value for name, value in (values or {}).items()}
     return bc.Material(form_of(choice), given)
-
-
-def entry(table: Mapping[str, Any], choice: bc.Model) -> Any:
-    """What a table by model says of a choice: under "name(word)" for one of its words, else under "name"."""
-    keys = (*(f"{choice.name}({word})" for word in choice.options), choice.name)
-    return table[next((key for key in keys if key in table), choice.name)]
 
 
 def draw_value(parameter: Parameter, rng: np.random.Generator, *, where: str) -> float:
@@ -86,14 +69,26 @@ def draw_values(
     }
 
 
-def corners(choice: bc.Model) -> list[dict[str, float]]:
-    """Every corner of the model's box; an open end is represented by the next number inside."""
+def corners(choice: bc.Model, *, shapes_only: bool = False) -> list[dict[str, float]]:
+    """Every corner of the model's box, or of its shapes', which alone move samples, with the rest at their defaults.
+
+    An open end is represented by the next number inside.
+    """
     ends = []
     for p in choice.parameters:
+        if shapes_only and p.per_channel != "no":
+            ends.append((p.default,))
+            continue
         low = np.nextafter(p.low, np.inf) if p.open_low else p.low
         high = np.nextafter(p.high, -np.inf) if p.open_high else p.high
         ends.append((float(low), float(high)))
     return [dict(zip((p.name for p in choice.parameters), corner, strict=True)) for corner in itertools.product(*ends)]
+
+
+def ends(choice: bc.Model) -> list[dict[str, float]]:
+    """All values at their lowest, and all at their highest: where each parameter is on its own, no other corner is."""
+    every = corners(choice)
+    return [every[0], every[-1]]
 
 
 def hemisphere(rng: np.random.Generator, count: int, dtype: torch.dtype = torch.float64) -> torch.Tensor:

@@ -9,6 +9,7 @@ import torch
 import brdfcore as bc
 from brdfcore.errors import ModelTextError, UnknownNameError
 from brdfcore.geometry import geometry
+from brdfcore.hard_cases import covering
 from brdfcore.models.form import Form, Term, build
 from brdfcore.models.text import Tie, parse
 
@@ -131,7 +132,7 @@ def test_needs_are_what_the_terms_read():
 def test_needs_are_sufficient_and_necessary(name):
     """Nothing is read that is not named (it would be None), and nothing named goes unread."""
     w = torch.tensor([0.6, 0.0, 0.8], dtype=torch.float64)
-    for choice in bc.MODELS[name].with_words(()):
+    for choice in covering(bc.MODELS[name]):
         one = Form((Term(name, choice),))
         values = bc.Material(one).values()
         for evaluate, needs in ((one.f, one.needs), (one.pdf, one.pdf_needs)):
@@ -178,23 +179,6 @@ def test_what_the_text_leaves_open_is_preferred_or_the_first(text, prefer, optio
 def test_build_returns_the_values_of_the_text():
     _, values, _ = build(parse("lambert(kd=[0.1, 0.2]) + kurt(m=0.3, f0=0.1) + kurt(m=kurt.m)"))
     assert values == {"lambert.kd": (0.1, 0.2), "kurt.m": 0.3, "kurt.f0": 0.1}
-
-
-def test_models_describe_themselves():
-    for name, model in bc.MODELS.items():
-        facts = model.describe()
-        assert facts["name"] == name
-        assert facts["summary"].endswith(".")
-        assert facts["reciprocal"] is model.reciprocal
-        assert facts["options"] == [list(group) for group in model.option_groups]
-        declared = {p.name for choice in model.with_words(()) for p in choice.parameters}
-        assert {p["name"] for p in facts["parameters"]} == declared
-        for parameter in facts["parameters"]:
-            for choice in model.with_words(()):
-                has = parameter["name"] in choice.parameter
-                assert not has or set(parameter["where"]) <= set(choice.options)
-                if parameter["where"] and set(parameter["where"]) <= set(choice.options):
-                    assert has or len(model.option_groups) > 1
 
 
 def test_equal_choices_are_equal():

@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 import torch
-from model_cases import CHOICE_IDS, EVERY_CHOICE, corners, draw_values, hemisphere, lobe_pairs, material_of
+from model_cases import CHOICE_IDS, EVERY_CHOICE, draw_values, ends, hemisphere, lobe_pairs, material_of
 from torch import nn
 
 import brdfcore as bc
@@ -92,7 +92,7 @@ def test_single_precision_materials():
 
 @every_choice
 def test_the_ends_of_the_box_stay_in_it_in_single_precision(choice):
-    for corner in corners(choice):
+    for corner in ends(choice):
         single = material_of(choice, corner).to(torch.float32)
         values = {key: value.detach() for key, value in single.values().items()}
         for key, value in values.items():
@@ -190,8 +190,7 @@ EVEN = ("sigma", "k")  # f goes with their square, so that 0 is a stationary poi
 def test_gradients_pass_on_the_ends_of_the_box(choice):
     """A start on an end must be able to leave it: no transform may flatten the gradient there."""
     rng = np.random.default_rng(53)
-    every = corners(choice)
-    for corner in (every[0], every[-1]):  # all low, all high
+    for corner in ends(choice):
         values = draw_values(choice, rng, where="mild")
         for p in choice.parameters:
             material = material_of(choice, values | {p.name: corner[p.name]})

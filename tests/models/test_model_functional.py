@@ -51,10 +51,9 @@ def test_vmap_over_geometry_equals_a_batch(choice):
     assert torch.allclose(form.f(values, kept), expected, rtol=1e-13, atol=0)
 
 
-@pytest.mark.parametrize("channels", [0, 3], ids=["gray", "rgb"])
 @every_choice
-def test_forward_and_reverse_jacobians_agree(choice, channels):
-    materials, values = batch_of(choice, 1, channels)
+def test_forward_and_reverse_jacobians_agree(choice):
+    materials, values = batch_of(choice, 1, 3)
     form = form_of(choice)
     values = {key: value[0] for key, value in values.items()}
     wi, wo = lobe_pairs(materials[0], np.random.default_rng(64), 10)

@@ -53,24 +53,24 @@ def test_reciprocal_and_not_negative(choice, dtype):
 
 
 @every_choice
-def test_gradcheck_of_stored_values_and_directions(choice):
+def test_gradcheck_of_stored_values(choice):
     rng = np.random.default_rng(12)
     material = material_of(choice, draw_values(choice, rng, where="mild", channels=2))
     wi, wo = lobe_pairs(material, rng, 3)
     names = [name for name, _ in material.named_parameters()]
 
-    def f(wi, wo, *stored):
+    def f(*stored):
         return functional_call(material, dict(zip(names, stored, strict=True)), (wi, wo))
 
     stored = [p.detach().clone().requires_grad_() for p in material.parameters()]
-    assert torch.autograd.gradcheck(f, (wi.requires_grad_(), wo.requires_grad_(), *stored), rtol=1e-5, atol=1e-7)
+    assert torch.autograd.gradcheck(f, stored, rtol=1e-5, atol=1e-7)
 
 
 @every_choice
-def test_gradcheck_of_natural_values_and_density(choice):
+def test_gradcheck_of_directions_natural_values_and_density(choice):
     rng = np.random.default_rng(13)
     material = material_of(choice, draw_values(choice, rng, where="mild", channels=2))
-    wi, wo = lobe_pairs(material, rng, 3)
+    wi, wo = lobe_pairs(material, rng, 2)
     form, values = form_of(choice), material.values()
 
     def f(wi, wo, *natural):
@@ -83,6 +83,21 @@ def test_gradcheck_of_natural_values_and_density(choice):
     for function in (f, pdf):
         inputs = (wi.requires_grad_(), wo.requires_grad_(), *natural)
         assert torch.autograd.gradcheck(function, inputs, rtol=1e-5, atol=1e-7)
+
+
+@every_choice
+def test_gradcheck_of_samples(choice):
+    """Differentiable rendering moves the samples themselves."""
+    rng = np.random.default_rng(10)
+    material = material_of(choice, draw_values(choice, rng, where="mild"))
+    form, values = form_of(choice), material.values()
+    wo, u = hemisphere(rng, 4), torch.tensor(rng.uniform(0, 1, (4, 3)))
+
+    def sample(wo, *natural):
+        return form.sample(dict(zip(values, natural, strict=True)), wo, u) + 0 * wo  # some depend on nothing
+
+    natural = [v.detach().clone().requires_grad_() for v in values.values()]
+    assert torch.autograd.gradcheck(sample, (wo.requires_grad_(), *natural), rtol=1e-5, atol=1e-7)
 
 
 @every_choice
@@ -99,31 +114,31 @@ def test_second_derivatives_exist(choice):
         assert all(g is None or g.isfinite().all() for g in second)
 
 
-@every_dtype
-@pytest.mark.parametrize("channels", [0, 3], ids=["gray", "rgb"])
+@pytest.mark.parametrize(("channels", "dtype"), [(0, torch.float32), (3, torch.float64)], ids=["gray-32", "rgb-64"])
 @every_choice
 def test_directions_broadcast(choice, channels, dtype):
     rng = np.random.default_rng(15)
     material = material_of(choice, draw_values(choice, rng, where="mild", channels=channels))
-    wi, wo = hemisphere(rng, 5, dtype), hemisphere(rng, 4, dtype)
+    wi, wo = hemisphere(rng, 3, dtype), hemisphere(rng, 4, dtype)
     count = material.channels
     assert count == (channels or 1)
     grid = material.f(wi[:, None], wo)
-    assert grid.shape == (5, 4, count)
-    assert material.pdf(wi[:, None], wo).shape == (5, 4)
-    assert material.weight(wi[:, None], wo).shape == (5, 4, count)
-    for i in range(5):
+    assert grid.shape == (3, 4, count)
+    assert material.weight(wi[:, None], wo).shape == (3, 4, count)
+    density = material.pdf(wi[:, None], wo)
+    assert density.shape == (3, 4)
+    for i in range(3):
         assert close(grid[i], material.f(wi[i], wo))
-        assert close(material.pdf(wi[:, None], wo)[i], material.pdf(wi[i], wo))
+        assert close(density[i], material.pdf(wi[i], wo))
     assert material.f(wi[0], wo[0]).shape == (count,)
     assert material.pdf(wi[0], wo[0]).shape == ()
     assert close(material.f(wi[0], wo[0]), grid[0, 0])
     assert material.f(wi[:0], wo[:1]).shape == (0, count)
     assert material.pdf(wi[:0], wo[:1]).shape == (0,)
-    u = torch.tensor(rng.uniform(0, 1, (6, 4, 3))).to(dtype)
-    assert material.sample(wo, u).shape == (6, 4, 3)
+    u = torch.tensor(rng.uniform(0, 1, (2, 4, 3))).to(dtype)
+    assert material.sample(wo, u).shape == (2, 4, 3)
     assert material.sample(wo[0], u[0, 0]).shape == (3,)
-    assert material.sample(wo[0], u).shape == (6, 4, 3)
+    assert material.sample(wo[0], u).shape == (2, 4, 3)
     assert bool((material.sample(wo, u) == torch.stack([material.sample(wo, row) for row in u])).all())
 
 
@@ -233,10 +248,14 @@ def test_a_gray_material_has_one_channel_and_equals_equal_channels(choice):
 
 
 ISOTROPIC = [choice for choice in CHOICES if "isotropic" in choice.options]
+# without what has no azimuth, and makes samples far from the lobe, where Q is large
+LOBES_ALONE = [choice for choice in ISOTROPIC if "compensated" not in choice.options]
 
 
 @every_dtype
-@pytest.mark.parametrize("choice", ISOTROPIC, ids=lambda c: f"{c.name}({','.join(c.options)})")
+@pytest.mark.parametrize(
+    "choice", [c for c in ISOTROPIC if "compensated" not in c.options], ids=lambda c: f"{c.name}({','.join(c.options)})"
+)
 def test_equal_widths_are_isotropic(choice, dtype):
     rng = np.random.default_rng(20)
     words = ["anisotropic" if word == "isotropic" else word for word in choice.options]
@@ -254,7 +273,7 @@ def test_equal_widths_are_isotropic(choice, dtype):
     assert float((two.sample(wo, u) - one.sample(wo, u)).detach().abs().max()) <= 16 * EPS[dtype]
 
 
-@pytest.mark.parametrize("choice", ISOTROPIC, ids=lambda c: f"{c.name}({','.join(c.options)})")
+@pytest.mark.parametrize("choice", LOBES_ALONE, ids=lambda c: f"{c.name}({','.join(c.options)})")
 def test_an_isotropic_lobe_turns_with_its_directions(choice):
     rng = np.random.default_rng(21)
     material = material_of(choice, draw_values(choice, rng, where="mild"))
