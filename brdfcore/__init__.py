@@ -15,12 +15,17 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import bounds, errors, plots, sampling
+    from . import bounds, energy, errors, plots, sampling
+    from .energy.albedo import Albedo, albedo
+    from .energy.certificate import Certificate, certify
+    from .energy.hemispherical import hemispherical_albedo
+    from .energy.tables import AlbedoTable, albedo_table
     from .fitting import LOSSES, OPTIMIZERS, Fit, Progress, fit
     from .formats import FORMATS, read
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
     from .models.material import Material, material
+    from .models.presets import PRESETS, Preset
 
 __version__ = version("brdfcore")
 
@@ -29,16 +34,26 @@ __all__ = [
     "LOSSES",
     "MODELS",
     "OPTIMIZERS",
+    "PRESETS",
     "QUANTITIES",
+    "Albedo",
+    "AlbedoTable",
+    "Certificate",
     "Fit",
     "Material",
     "Model",
+    "Preset",
     "Progress",
     "Samples",
     "__version__",
+    "albedo",
+    "albedo_table",
     "bounds",
+    "certify",
+    "energy",
     "errors",
     "fit",
+    "hemispherical_albedo",
     "material",
     "plots",
     "read",
@@ -46,17 +61,22 @@ __all__ = [
 ]
 
 _MODULES = {
+    ".energy.albedo": ("Albedo", "albedo"),
+    ".energy.certificate": ("Certificate", "certify"),
+    ".energy.hemispherical": ("hemispherical_albedo",),
+    ".energy.tables": ("AlbedoTable", "albedo_table"),
     ".fitting": ("LOSSES", "OPTIMIZERS", "Fit", "Progress", "fit"),
     ".formats": ("FORMATS", "read"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),
     ".models.material": ("Material", "material"),
+    ".models.presets": ("PRESETS", "Preset"),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    if name in ("bounds", "errors", "plots", "sampling"):
+    if name in ("bounds", "energy", "errors", "plots", "sampling"):
         return importlib.import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -33,8 +33,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         )
         dispatcher.start()
         try:
-            with ThreadPoolExecutor(1, "aside") as aside:
-                app.state.service = State(chosen, store, datasets, dispatcher, aside)
+            with ThreadPoolExecutor(1, "aside") as aside, ThreadPoolExecutor(1, "computing") as computing:
+                app.state.service = State(chosen, store, datasets, dispatcher, aside, computing)
                 yield
         finally:
             dispatcher.stop()

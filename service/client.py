@@ -3,69 +3,59 @@
 with Client("http://127.0.0.1:8000") as client:
     fit = client.fit("garnet_red.brdf", model="lambert + kurt", quantity="brdf")
     print(fit.report())
-
-ClientError
-|-- UnreachableError            no answer at all
-|-- ProblemError                the service refused, in its own sentence: .status .detail .field .errors
-|-- FitFailedError              the fit was accepted and has failed or was cancelled
-|-- FitUnfinishedError          a result was asked of a fit that has none yet
-`-- WaitError (TimeoutError)    the fit was not finished in the time given
+    print(client.albedo("lambert + kurt", [0, 60, 89]).values)
 """
 
 import io
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import httpx2
+from pydantic import BaseModel
 
+from .client_errors import (
+    ClientError,
+    FitFailedError,
+    FitUnfinishedError,
+    JobFailedError,
+    JobUnfinishedError,
+    ProblemError,
+    UnreachableError,
+    WaitError,
+)
+from .client_results import FitResult, JobResult, Send, TableResult
 from .schemas import (
-    FINISHED,
-    CostView,
+    AlbedoView,
     DatasetView,
-    FitOutcome,
+    EvaluationView,
     FitView,
-    Interval,
-    JobStatus,
     ModelList,
     ModelView,
     Problem,
+    TableView,
 )
+
+__all__ = [
+    "Client",
+    "ClientError",
+    "FitFailedError",
+    "FitResult",
+    "FitUnfinishedError",
+    "JobFailedError",
+    "JobUnfinishedError",
+    "ProblemError",
+    "TableResult",
+    "UnreachableError",
+    "WaitError",
+]
 
 INLINE_ROWS = 10_000  # more samples than these travel as a file
 _WAIT = 30.0  # how long one request waits for its fit; the service caps it at 60 [s]
+_Result = TypeVar("_Result", bound=JobResult[Any])
 _COLUMNS = ("wi", "wo", "values", "channels", "sigma", "weight", "cell", "azimuth_observed")
-
-
-class ClientError(Exception):
-    """Base of every error that the client raises on purpose."""
-
-
-class UnreachableError(ClientError):
-    """The service did not answer."""
-
-
-class ProblemError(ClientError):
-    """The service refused; the message is its sentence."""
-
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(problem.detail)
-        self.status, self.detail, self.field = problem.status, problem.detail, problem.field
-        self.errors = problem.errors or []
-
-
-class FitFailedError(ClientError):
-    """The fit has failed or was cancelled; the message says why."""
-
-
-class FitUnfinishedError(ClientError):
-    """The fit has no result yet."""
-
-
-class WaitError(ClientError, TimeoutError):
-    """The fit did not finish in the time that was given to wait."""
 
 
 class Client:
@@ -120,7 +110,7 @@ class Client:
         angle_unit: str | None = None,
         wait: bool = True,
         timeout: float | None = None,
-    ) -> "FitResult":
+    ) -> FitResult:
         """The fit of a model to a measured file, a dataset, arrays by name, or an object like brdfcore.Samples.
 
         format, quantity and angle_unit declare what data do not say. With wait=True the fit is finished on return;
@@ -138,16 +128,82 @@ class Client:
                 body["dataset"] = self._upload(_npz(columns), {"angle_unit": "degrees"}).id
             else:
                 body["samples"] = columns
+        return self._submitted("/v1/fits", body, FitResult, FitView, wait, timeout)
+
+    def get(self, fit_id: str) -> FitResult:
+        """The fit of that id as it stands."""
+        return FitResult(self._send, FitView.model_validate_json(self._send("GET", f"/v1/fits/{fit_id}").content))
+
+    def evaluate(
+        self,
+        material: "str | Mapping[str, Any] | Any",
+        *,
+        wi: Any = None,
+        wo: Any = None,
+        theta_i_deg: Any = None,
+        phi_i_deg: Any = None,
+        theta_o_deg: Any = None,
+        phi_o_deg: Any = None,
+    ) -> EvaluationView:
+        """The BRDF, density and weight of a material at pairs of directions, wi and wo or the four angles.
+
+        A material is a text, a preset's name, its JSON, or an object like brdfcore.Material.
+        """
+        given = {"wi": wi, "wo": wo, "theta_i_deg": theta_i_deg, "phi_i_deg": phi_i_deg}
+        given |= {"theta_o_deg": theta_o_deg, "phi_o_deg": phi_o_deg}
+        body = {name: _plain(value) for name, value in given.items() if value is not None}
+        answer = self._send("POST", "/v1/evaluate", json=body | {"material": _material(material)})
+        return EvaluationView.model_validate_json(answer.content)
+
+    def albedo(
+        self,
+        material: "str | Mapping[str, Any] | Any",
+        theta_deg: Any,
+        phi_deg: float = 0.0,
+        tolerance: float = 1e-6,
+    ) -> AlbedoView:
+        """The directional albedos of a material, given as in `evaluate`, for polar angles [degrees]."""
+        body = {"material": _material(material), "theta_deg": _plain(theta_deg), "phi_deg": phi_deg}
+        answer = self._send("POST", "/v1/albedo", json=body | {"tolerance": tolerance})
+        return AlbedoView.model_validate_json(answer.content)
+
+    def albedo_table(
+        self,
+        material: "str | Mapping[str, Any] | Any",
+        axes: "Mapping[str, tuple[float, float] | None] | None" = None,
+        tolerance: float = 1e-4,
+        *,
+        wait: bool = True,
+        timeout: float | None = None,
+    ) -> TableResult:
+        """The table of albedos of a material, given as in `evaluate`, over axes such as {"theta_deg": (0, 85)}.
+
+        With wait=True it is finished on return; raises JobFailedError, and WaitError after `timeout` s.
+        """
+        body = {"material": _material(material), "axes": _plain(dict(axes or {})), "tolerance": tolerance}
+        return self._submitted("/v1/albedo", body, TableResult, TableView, wait, timeout)
+
+    def get_table(self, table_id: str) -> TableResult:
+        """The table of that id as it stands."""
+        return TableResult(
+            self._send, TableView.model_validate_json(self._send("GET", f"/v1/albedo/{table_id}").content)
+        )
+
+    def _submitted(
+        self,
+        path: str,
+        body: Mapping[str, Any],
+        made: Callable[[Send, Any], _Result],
+        view: type[BaseModel],
+        wait: bool,
+        timeout: float | None,
+    ) -> _Result:
         begun = time.monotonic()
         seconds = int(_WAIT if timeout is None else min(timeout, _WAIT)) if wait else 0
-        answer = self._send("POST", "/v1/fits", json=body, headers={"prefer": f"wait={seconds}"})
-        result = FitResult(self, FitView.model_validate_json(answer.content))
+        answer = self._send("POST", path, json=body, headers={"prefer": f"wait={seconds}"})
+        result = made(self._send, view.model_validate_json(answer.content))
         left = None if timeout is None else max(0.0, timeout - (time.monotonic() - begun))
         return result.wait(left) if wait else result
-
-    def get(self, fit_id: str) -> "FitResult":
-        """The fit of that id as it stands."""
-        return FitResult(self, FitView.model_validate_json(self._send("GET", f"/v1/fits/{fit_id}").content))
 
     def _upload(self, content: Any, declared: Mapping[str, str | None]) -> DatasetView:
         given = {name: value for name, value in declared.items() if value is not None}
@@ -170,109 +226,9 @@ class Client:
         raise ProblemError(Problem(title=answer.reason_phrase, status=answer.status_code, detail=detail))
 
 
-class FitResult:
-    """A fit on the service. `job_status` says how it stands; all that is its result needs it to have succeeded."""
-
-    def __init__(self, client: Client, view: FitView) -> None:
-        self._client = client
-        self.view = view
-
-    def __repr__(self) -> str:
-        return f"FitResult({self.id}, {self.view.request.model!r}, {self.job_status})"
-
-    @property
-    def id(self) -> str:
-        """The fit's id."""
-        return self.view.id
-
-    @property
-    def job_status(self) -> JobStatus:
-        """queued, running, succeeded, failed or cancelled, as of the last answer."""
-        return self.view.status
-
-    def refresh(self) -> Self:
-        """The fit as it stands now."""
-        self.view = self._client.get(self.id).view
-        return self
-
-    def wait(self, timeout: float | None = None) -> Self:
-        """The fit, succeeded; FitFailedError if it ends otherwise, WaitError after `timeout` s."""
-        begun = time.monotonic()
-        while self.job_status not in FINISHED:
-            waited = time.monotonic() - begun
-            if timeout is not None and waited >= timeout:
-                raise WaitError(f"Expected fit {self.id} to finish in the time given, but it is {self.job_status}.")
-            time.sleep(min(max(waited / 10, 0.05), 1.0))
-            self.refresh()
-        if self.job_status != "succeeded":
-            raise FitFailedError(self.view.error or f"The fit {self.id} was cancelled.")
-        return self
-
-    def cancel(self) -> Self:
-        """The fit, cancelled."""
-        answer = self._client._send("POST", f"/v1/fits/{self.id}/cancel")
-        self.view = FitView.model_validate_json(answer.content)
-        return self
-
-    def delete(self) -> None:
-        """Remove the fit from the service."""
-        self._client._send("DELETE", f"/v1/fits/{self.id}")
-
-    @property
-    def result(self) -> FitOutcome:
-        """All that the fit gave."""
-        if self.view.result is None:
-            raise FitUnfinishedError(
-                f"Expected fit {self.id} to have succeeded, but it is {self.job_status}. Call wait()."
-            )
-        return self.view.result
-
-    @property
-    def parameters(self) -> dict[str, float | list[float | None] | None]:
-        """The value of each parameter, or one a channel; None where the data do not determine it."""
-        return self.result.parameters
-
-    @property
-    def intervals(self) -> dict[str, Interval | list[Interval]]:
-        """The 95 % interval of each parameter, or one a channel; None where there is none."""
-        return self.result.intervals
-
-    @property
-    def errors(self) -> dict[str, float | None]:
-        """The error under every loss."""
-        return self.result.errors
-
-    @property
-    def status(self) -> str:
-        """How the fit ended, "converged" or "stopped_early"."""
-        return self.result.status
-
-    @property
-    def undetermined(self) -> list[str]:
-        """The parameters that the data do not determine."""
-        return self.result.undetermined
-
-    @property
-    def cost(self) -> CostView:
-        """What the fit took."""
-        return self.result.cost
-
-    def report(self) -> str:
-        """The result as plain text."""
-        return self.result.report
-
-    def plot(
-        self,
-        name: str = "lobes",
-        kind: str = "svg",
-        *,
-        scale: str = "linear",
-        theta_i_deg: Sequence[float] = (),
-        channel: str | None = None,
-    ) -> bytes:
-        """The plot of that name, as the bytes of an SVG or PNG file."""
-        asked = {"scale": scale, "theta_i_deg": list(theta_i_deg)} | ({"channel": channel} if channel else {})
-        return self._client._send("GET", f"/v1/fits/{self.id}/plots/{name}.{kind}", params=asked).content
+def _material(given: Any) -> Any:
+    """A material as the wire wants it."""
+    return given.to_json() if hasattr(given, "to_json") else _plain(given)
 
 
 def _columns(data: Any, quantity: str | None) -> dict[str, Any]:

@@ -21,11 +21,12 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from torch import Tensor
 
 from brdfcore.errors import BrdfError
 from brdfcore.formats import Samples, read
 
-from .schemas import DatasetView, FitRequest, InlineSamples
+from .schemas import DatasetView, DirectionPairs, FitRequest, InlineSamples
 
 _ABANDONED = 24 * 3600.0  # no upload lasts so long, so a folder older than this is what a killed server left [s]
 
@@ -117,7 +118,17 @@ def inline_samples(given: InlineSamples) -> Samples:
         "cell": given.cell,
         "azimuth_observed": given.azimuth_observed,
     }
-    values = torch.tensor(given.values, dtype=torch.float64)
+    return _samples(given, torch.tensor(given.values, dtype=torch.float64), "samples", **keywords)
+
+
+def directions(given: DirectionPairs) -> tuple[Tensor, Tensor]:
+    """The unit vectors wi and wo (N, 3) of a request's body, both above the horizon."""
+    count = len(given.wi if given.wi is not None else given.theta_i_deg or [])
+    samples = _samples(given, torch.zeros(count, dtype=torch.float64), "")
+    return samples.wi, samples.wo
+
+
+def _samples(given: DirectionPairs, values: Tensor, field: str, **keywords: Any) -> Samples:
     try:
         if given.wi is not None and given.wo is not None:
             return Samples(given.wi, given.wo, values, **keywords)
@@ -128,7 +139,7 @@ def inline_samples(given: InlineSamples) -> Samples:
         name = error.field or ""
         if name in ("theta_i", "phi_i", "theta_o", "phi_o"):
             name += "_deg"
-        error.field = f"samples.{name}" if name else "samples"
+        error.field = ".".join(part for part in (field, name) if part)
         raise
 
 

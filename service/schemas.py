@@ -9,18 +9,30 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
+JobKind = Literal["fit", "albedo_table"]
 JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]
 FINISHED: tuple[JobStatus, ...] = ("succeeded", "failed", "cancelled")
 
 # fail_fast: of 10,000 bad rows the first is named, and the others take no time
 Column = Annotated[list[float], Field(fail_fast=True)]
 Direction = Annotated[list[float], Field(min_length=3, max_length=3, fail_fast=True)]
-Directions = Annotated[list[Direction], Field(fail_fast=True)]
+Directions = Annotated[list[Direction], Field(min_length=1, fail_fast=True)]
+Angles = Annotated[list[float], Field(min_length=1, fail_fast=True)]
+Theta = Annotated[float, Field(ge=0, lt=90)]
+Range = Annotated[list[float], Field(min_length=2, max_length=2)]
 Rows = Annotated[list[Column], Field(min_length=1, fail_fast=True)]
 # the tags never reach a user: errors.py drops them from the path to the offending field
 PerChannel = Annotated[
     Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<numbers>")],
     Discriminator(lambda value: "<numbers>" if isinstance(value, list) else "<number>"),
+]
+
+
+MaterialText = Annotated[str, Field(min_length=1, max_length=2000), Tag("<text>")]
+# a text, a preset's name, or the JSON that a fit's result holds as `material`
+MaterialIn = Annotated[
+    MaterialText | Annotated[dict[str, Any], Tag("<json>")],
+    Discriminator(lambda value: "<json>" if isinstance(value, dict) else "<text>"),
 ]
 
 
@@ -36,25 +48,39 @@ class View(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True)
 
 
-class InlineSamples(Body):
-    """Measured samples, one row each: directions as unit vectors (`wi`, `wo`) or as the four angles, and values.
+class ProgressView(View):
+    """How far a running job is; only a fit has a loss."""
+
+    stage: str
+    fraction: float
+    loss: float | None
+
+
+class JobView(View):
+    """What every job shows of itself."""
+
+    id: str
+    status: JobStatus
+    progress: ProgressView | None
+    error: str | None = Field(description="why it failed, in one sentence")
+    attempts: int = Field(description="how often it was started")
+    created: datetime
+    started: datetime | None
+    finished: datetime | None
+
+
+class DirectionPairs(Body):
+    """Pairs of directions, one row each: unit vectors (`wi`, `wo`) or the four angles.
 
     `wi` points to the light, `wo` to the viewer, z along the normal; the mirror of azimuth phi is phi + 180.
     """
 
     wi: Directions | None = Field(None, description="unit vectors to the light")
     wo: Directions | None = Field(None, description="unit vectors to the viewer")
-    theta_i_deg: Column | None = Field(None, description="polar angle of wi [degrees]")
-    phi_i_deg: Column | None = Field(None, description="azimuth of wi [degrees]")
-    theta_o_deg: Column | None = Field(None, description="polar angle of wo [degrees]")
-    phi_o_deg: Column | None = Field(None, description="azimuth of wo [degrees]")
-    values: Rows = Field(description="one row a sample, one number a channel, in the declared quantity")
-    quantity: str = Field(description="what values are: brdf [1/sr], brdf_cos [1/sr] or reflectance_factor [1]")
-    channels: list[str] | None = Field(None, description="a name for each channel")
-    sigma: Rows | None = Field(None, description="standard deviations, shaped and declared as values are")
-    weight: Column | None = Field(None, description="factor of each sample in every loss")
-    cell: Column | None = Field(None, description="measure of each sample's grid cell [sr^2]")
-    azimuth_observed: bool | None = Field(None, description="whether the sample was turned; the data say, if absent")
+    theta_i_deg: Angles | None = Field(None, description="polar angle of wi [degrees]")
+    phi_i_deg: Angles | None = Field(None, description="azimuth of wi [degrees]")
+    theta_o_deg: Angles | None = Field(None, description="polar angle of wo [degrees]")
+    phi_o_deg: Angles | None = Field(None, description="azimuth of wo [degrees]")
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Self:
@@ -64,9 +90,25 @@ class InlineSamples(Body):
         some = [any(part is not None for part in parts) for parts in (vectors, angles)]
         if full != some or sum(full) != 1:
             raise ValueError(
-                "Expected samples to have either wi and wo, or theta_i_deg, phi_i_deg, theta_o_deg and phi_o_deg. "
+                "Expected directions as either wi and wo, or theta_i_deg, phi_i_deg, theta_o_deg and phi_o_deg. "
                 "Give one of the two, in full."
             )
+        return self
+
+
+class InlineSamples(DirectionPairs):
+    """Measured samples, one row each: a pair of directions and the values measured there."""
+
+    values: Rows = Field(description="one row a sample, one number a channel, in the declared quantity")
+    quantity: str = Field(description="what values are: brdf [1/sr], brdf_cos [1/sr] or reflectance_factor [1]")
+    channels: list[str] | None = Field(None, description="a name for each channel")
+    sigma: Rows | None = Field(None, description="standard deviations, shaped and declared as values are")
+    weight: Column | None = Field(None, description="factor of each sample in every loss")
+    cell: Column | None = Field(None, description="measure of each sample's grid cell [sr^2]")
+    azimuth_observed: bool | None = Field(None, description="whether the sample was turned; the data say, if absent")
+
+    @model_validator(mode="after")
+    def _same_channels(self) -> Self:
         for name, rows in (("values", self.values), ("sigma", self.sigma or [])):
             for number, row in enumerate(rows):
                 if len(row) != len(rows[0]) or not row:
@@ -96,6 +138,115 @@ class FitRequest(Body):
             raise ValueError("Expected either dataset or samples to be given. Give exactly one of them.")
         return self
 
+    def arguments(self) -> dict[str, Any]:
+        """What `brdfcore.fit` and its check are asked, by keyword: everything but the data."""
+        return self.model_dump(exclude={"dataset", "samples"})
+
+
+class EvaluationRequest(DirectionPairs):
+    """A material, and the pairs of directions at which it is evaluated."""
+
+    material: MaterialIn = Field(description="text, name of a preset, or a material's JSON")
+
+
+class EvaluationView(View):
+    """A material's values, one row a pair of directions, one column a channel; null where there is no finite number."""
+
+    material: str = Field(description="the text that was evaluated, all values in it")
+    f: list[list[float | None]] = Field(description="the BRDF, without the cosine [1/sr]")
+    pdf: list[float | None] = Field(description="density with which wi is sampled for wo [1/sr]")
+    weight: list[list[float | None]] = Field(description="f cos theta_i / pdf, 0 where pdf is 0 [1]")
+
+
+class AlbedoRequest(Body):
+    """A material, and either the angles of which albedos are given at once, or the axes of a table, which is a job."""
+
+    material: MaterialIn = Field(description="text, name of a preset, or a material's JSON")
+    theta_deg: Annotated[list[Theta], Field(min_length=1, fail_fast=True)] | None = Field(
+        None, description="polar angles [degrees]; values are given at once"
+    )
+    phi_deg: float = Field(0.0, description="azimuth of the values [degrees]")
+    axes: dict[str, Range | None] | None = Field(
+        None,
+        description='axes of a table, such as {"theta_deg": [0, 85], "kurt.m": null}; null is the usual range. '
+        "theta_deg is always an axis, to the horizon unless it is given an end",
+    )
+    tolerance: float | None = Field(
+        None, ge=1e-12, le=0.1, description="largest error, as a share of max(1, albedo); 1e-6, and 1e-4 for a table"
+    )
+
+    @model_validator(mode="after")
+    def _values_or_table(self) -> Self:
+        if (self.theta_deg is None) == (self.axes is None):
+            raise ValueError(
+                "Expected either theta_deg, for values, or axes, for a table, to be given. Give exactly one of them."
+            )
+        return self
+
+
+class AlbedoView(View):
+    """Directional albedos, one row an angle, one column a channel; null where there is no finite number."""
+
+    material: str = Field(description="the text that was integrated, all values in it")
+    theta_deg: list[float]
+    phi_deg: float
+    values: list[list[float | None]] = Field(description="directional albedos [1]")
+    error: list[list[float | None]] = Field(description="the error claimed for each [1]")
+    tolerance: float
+    met: bool = Field(description="whether every claimed error is at most tolerance * max(1, value)")
+    method: str
+    evaluations: int = Field(description="directions at which lobes were evaluated")
+    seconds: float
+
+
+class TableRequestView(View):
+    """A table's request as it was accepted."""
+
+    material: str
+    axes: dict[str, list[float] | None]
+    tolerance: float
+
+
+class AxisView(View):
+    """An axis of a table; the names of angles end in _deg, and their ends are in degrees."""
+
+    name: str
+    low: float
+    high: float
+    nodes: int
+
+
+class TableOutcome(View):
+    """A finished table, without its numbers: GET /v1/albedo/{table_id}/table sends those."""
+
+    hash: str = Field(description="of what made it: version, material, axes and tolerance")
+    axes: list[AxisView]
+    channels: int
+    tolerance: float
+    error: float = Field(description="claimed, with interpolation, as a share of max(1, albedo)")
+    met: bool = Field(description="whether error is at most tolerance")
+    evaluations: int
+    seconds: float = Field(description="that making it took, once; the same table is not made again")
+
+
+class TableSummary(JobView):
+    """A table's job without its result, as the list shows it."""
+
+    request: TableRequestView
+
+
+class TableView(TableSummary):
+    """A table's job and, once it has succeeded, what came out."""
+
+    result: TableOutcome | None
+
+
+class TablePage(View):
+    """Tables, newest first; `next` is the cursor of the page that follows."""
+
+    items: list[TableSummary]
+    next: str | None
+
 
 class SamplesView(View):
     """What stands in for inline samples when a request is shown again."""
@@ -116,14 +267,6 @@ class RequestView(View):
     gray: list[str]
     per_channel: list[str]
     seed: int
-
-
-class ProgressView(View):
-    """How far a running fit is."""
-
-    stage: str
-    fraction: float
-    loss: float | None
 
 
 class CostView(View):
@@ -167,18 +310,10 @@ class FitOutcome(View):
     report: str = Field(description="all of this as plain text, for people")
 
 
-class FitSummary(View):
+class FitSummary(JobView):
     """A fit without its result, as the list shows it."""
 
-    id: str
-    status: JobStatus
-    progress: ProgressView | None
     request: RequestView
-    error: str | None = Field(description="why it failed, in one sentence")
-    attempts: int = Field(description="how often it was started")
-    created: datetime
-    started: datetime | None
-    finished: datetime | None
 
 
 class FitView(FitSummary):
@@ -215,10 +350,20 @@ class ModelView(View):
     parameters: list[dict[str, Any]]
 
 
+class PresetView(View):
+    """A named material: its name stands for its whole text wherever a material's text is read."""
+
+    name: str
+    text: str = Field(description="the material's text")
+    summary: str
+    source: str
+
+
 class ModelList(View):
-    """Every model that the text of a fit may name."""
+    """Every model that the text of a fit may name, and every preset that may be the text."""
 
     items: list[ModelView]
+    presets: list[PresetView]
 
 
 class HealthView(View):

@@ -15,10 +15,11 @@ class Settings:
 
     data            folder of the datasets, the job store and its lock; made where it does not exist
     host, port      where the service listens
-    workers         fits that run at the same time, each in one process with one thread
+    workers         fits and tables that run at the same time, each in one process with one thread
     upload_limit    largest dataset that is accepted [bytes]
-    inline_rows     most samples that POST /v1/fits takes inline; more go through POST /v1/datasets
-    fit_seconds     longest that one attempt at a fit may run [s]
+    inline_rows     most samples that POST /v1/fits takes inline, more go through POST /v1/datasets; and most pairs of
+                    directions that POST /v1/evaluate takes
+    fit_seconds     longest that one attempt at a fit or a table may run [s]
     fit_memory      most memory that one attempt may allocate [bytes]
     """
 

@@ -16,7 +16,7 @@ class State:
     """The parts behind the routes.
 
     `aside` is one thread for what takes long: reading uploads, so that memory holds one at a time, and drawing,
-    because matplotlib allows no second thread.
+    because matplotlib allows no second thread. `computing` is another for what is computed while a request waits.
     """
 
     settings: Settings
@@ -24,6 +24,7 @@ class State:
     datasets: Datasets
     dispatcher: Dispatcher
     aside: ThreadPoolExecutor
+    computing: ThreadPoolExecutor
 
 
 def state(request: Request) -> State:

@@ -1,6 +1,6 @@
 """What a fit is asked: the text's form with its open options decided, and which values are free, fixed or gray."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -8,7 +8,7 @@ from torch import Tensor
 
 from ..errors import ModelTextError, ParameterError, unknown_name
 from ..models.form import Form, build
-from ..models.text import Tie, parse
+from ..models.text import ParsedTerm, Tie, parse
 from .losses import LOSSES
 
 OPTIMIZERS = ("auto", "least_squares", "lbfgs", "adam")
@@ -46,13 +46,16 @@ def plan(
     observed. Values in the text are starts. A reflectance has one value a channel unless `gray` names it; an f0 has
     one for all unless `per_channel` names it or its start is a list.
     """
-    form, given, left_open = build(parse(model), prefer=("anisotropic",) if azimuth_observed else ())
+    parsed = parse(model)
+    form, given, left_open = build(parsed, prefer=("anisotropic",) if azimuth_observed else ())
     choices = tuple(
         f"{label} is {word}: the sample's azimuth was {'' if azimuth_observed else 'not '}observed."
         for label, words in left_open.items()
         for word in words
         if word in ("isotropic", "anisotropic")
     )
+    if azimuth_observed:
+        choices += tuple(_held_isotropic(form, parsed))
     fixed = dict(fixed or {})
     for field, keys in (("gray", gray), ("per_channel", per_channel)):
         if isinstance(keys, str):
@@ -97,6 +100,16 @@ def plan(
     for key, tie in form.ties.items():
         _check_tie(form, key, tie, channels, start, fixed)
     return Plan(form, start, frozenset(fixed), gray, per_channel, choices)
+
+
+def _held_isotropic(form: Form, parsed: Sequence[ParsedTerm]) -> Iterator[str]:
+    """A sentence for each term that another of its words, and nothing else, keeps from being anisotropic."""
+    for term, written in zip(form.terms, parsed, strict=True):
+        for pair in term.model.apart:
+            rest = [word for word in written.words if word not in pair]
+            others = type(term.model).with_words(rest, tuple(written.arguments))
+            if len(rest) < len(written.words) and any("anisotropic" in other.options for other in others):
+                yield f"{term.label} is isotropic, which {pair[1]} lobes are, though the sample's azimuth was observed."
 
 
 def _tensor(key: str, value: object) -> Tensor:

@@ -1,6 +1,7 @@
 """Figures of materials and fits; matplotlib is loaded with the first one."""
 
 from ._figure import kind_of, save, to_bytes
+from .albedo import albedo
 from .lobes import check_scale, lobes
 
-__all__ = ["check_scale", "kind_of", "lobes", "save", "to_bytes"]
+__all__ = ["albedo", "check_scale", "kind_of", "lobes", "save", "to_bytes"]

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TextIO
 
 from .runner import Event, Runner
-from .store import Attempt, JobStore
+from .store import ASK_FOR_LESS, Attempt, JobStore
 
 _BUSY = 0.05  # how soon a cancelled attempt is noticed [s]
 _IDLE = 0.5  # how soon a job is noticed that another process has submitted [s]
@@ -85,7 +85,7 @@ class Dispatcher:
         try:
             self._runner.start(attempt)
         except Exception:
-            _log.exception("the attempt %d at fit %s did not start", attempt.fence, attempt.id)
+            _log.exception("the attempt %d at job %s did not start", attempt.fence, attempt.id)
             self._store.retry(attempt, "could not be started")
         else:
             self._ends[attempt] = time.monotonic() + self._fit_seconds
@@ -113,7 +113,7 @@ class Dispatcher:
         elif event.kind == "failed":
             self._store.fail(event.attempt, event.text)
         else:
-            _log.warning("the attempt %d at fit %s %s", event.attempt.fence, event.attempt.id, event.text)
+            _log.warning("the attempt %d at job %s %s", event.attempt.fence, event.attempt.id, event.text)
             self._store.retry(event.attempt, event.text)
         self._ends.pop(event.attempt, None)
 
@@ -136,4 +136,4 @@ def _locked(lock: TextIO) -> bool:
 
 
 def _overdue(seconds: float) -> str:
-    return f"Expected the fit to end within {seconds:g} s, but it did not. Use fewer samples or a simpler model."
+    return f"Expected the job to end within {seconds:g} s, but it did not. {ASK_FOR_LESS}"

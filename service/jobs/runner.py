@@ -13,10 +13,11 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Literal, Protocol
 
+from ..schemas import JobKind
 from . import work
 from .store import Attempt
 
-Work = Callable[[Connection, str, bytes, int], None]
+Work = Callable[[Connection, str, JobKind, bytes, int], None]
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,8 @@ class LocalRunner:
     def start(self, attempt: Attempt) -> None:
         """Begin the attempt."""
         here, there = self._context.Pipe(duplex=False)
-        process = self._context.Process(
-            target=self._target, args=(there, self._data, attempt.body, self._memory), daemon=True
-        )
+        arguments = (there, self._data, attempt.kind, attempt.body, self._memory)
+        process = self._context.Process(target=self._target, args=arguments, daemon=True)
         try:
             with _no_main():
                 process.start()

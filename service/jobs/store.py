@@ -1,8 +1,9 @@
 # ruff: noqa: S608 - what is put into a query's text here are constants of this file; values go as parameters
 """The durable job store: one SQLite table, changed only by single conditional UPDATEs.
 
-A job is queued, then running under a lease, then succeeded, failed or cancelled. Each claim adds 1 to `attempts`,
-which is also the fencing number: whoever holds an older number, or a job that is no longer running, is refused.
+A job is a fit or a table of albedos. It is queued, then running under a lease, then succeeded, failed or cancelled.
+Each claim adds 1 to `attempts`, which is also the fencing number: whoever holds an older number, or a job that is no
+longer running, is refused.
 A restart of the server ends an attempt through no fault of the job, so it is counted apart and capped apart.
 
 Every write is BEGIN IMMEDIATE: a deferred transaction that writes after a read fails at once when another has
@@ -19,15 +20,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..schemas import JobStatus
+from ..schemas import JobKind, JobStatus
 
 MOST_CRASHES = 3
 MOST_RESTARTS = 20
+ASK_FOR_LESS = "Try fewer samples, fewer axes or a simpler model."
 
 _TABLE = """
 CREATE TABLE IF NOT EXISTS jobs (
     number    INTEGER PRIMARY KEY AUTOINCREMENT,
     id        TEXT NOT NULL UNIQUE,
+    kind      TEXT NOT NULL CHECK (kind IN ('fit', 'albedo_table')),
     status    TEXT NOT NULL DEFAULT 'queued'
               CHECK (status IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
     body      BLOB NOT NULL,
@@ -44,7 +47,7 @@ CREATE TABLE IF NOT EXISTS jobs (
 ) STRICT;
 CREATE INDEX IF NOT EXISTS jobs_by_status ON jobs (status, number);
 """
-_COLUMNS = "number, id, status, request, progress, result, error, attempts, created, started, finished"
+_COLUMNS = "number, id, kind, status, request, progress, result, error, attempts, created, started, finished"
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class Job:
 
     number: int
     id: str
+    kind: JobKind
     status: JobStatus
     request: str
     progress: str | None
@@ -71,6 +75,7 @@ class Attempt:
     id: str
     fence: int
     body: bytes
+    kind: JobKind = "fit"
 
 
 class JobStore:
@@ -90,13 +95,13 @@ class JobStore:
         self._reader.close()
         self._writer.close()
 
-    def submit(self, request: str, body: bytes) -> Job:
+    def submit(self, request: str, body: bytes, kind: JobKind = "fit") -> Job:
         """A new queued job; `request` is what to show of it, `body` what to work on."""
         job_id = uuid.uuid4().hex
         with self._write() as db:
             rows = db.execute(
-                f"INSERT INTO jobs (id, body, request, created) VALUES (?, ?, ?, ?) RETURNING {_COLUMNS}",
-                (job_id, body, request, self._clock()),
+                f"INSERT INTO jobs (id, kind, body, request, created) VALUES (?, ?, ?, ?, ?) RETURNING {_COLUMNS}",
+                (job_id, kind, body, request, self._clock()),
             ).fetchall()
         return _job(rows[0])
 
@@ -105,11 +110,12 @@ class JobStore:
         rows = self._read(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", job_id)
         return _job(rows[0]) if rows else None
 
-    def newest(self, limit: int, before: int | None = None) -> list[Job]:
-        """Up to `limit` jobs with numbers below `before`, newest first."""
+    def newest(self, limit: int, before: int | None = None, kind: JobKind = "fit") -> list[Job]:
+        """Up to `limit` jobs of a kind with numbers below `before`, newest first."""
         rows = self._read(
-            f"SELECT {_COLUMNS} FROM jobs WHERE number < ? ORDER BY number DESC LIMIT ?",
+            f"SELECT {_COLUMNS} FROM jobs WHERE number < ? AND kind = ? ORDER BY number DESC LIMIT ?",
             2**63 - 1 if before is None else before,
+            kind,
             limit,
         )
         return [_job(row) for row in rows]
@@ -118,6 +124,10 @@ class JobStore:
         """What the job works on, as it was submitted."""
         rows = self._read("SELECT body FROM jobs WHERE id = ?", job_id)
         return bytes(rows[0][0]) if rows else None
+
+    def mentioned(self, kind: JobKind, text: str) -> bool:
+        """Whether the result of a job of that kind mentions the text."""
+        return bool(self._read("SELECT 1 FROM jobs WHERE kind = ? AND instr(result, ?) LIMIT 1", kind, text))
 
     def claim(self) -> Attempt | None:
         """The oldest job that is queued or whose lease has run out, now running under a new lease."""
@@ -135,7 +145,7 @@ class JobStore:
                 "UPDATE jobs SET status = 'running', attempts = attempts + 1, lease_end = ?, progress = NULL, "
                 "started = coalesce(started, ?) "
                 f"WHERE number = (SELECT number FROM jobs WHERE {due} ORDER BY number LIMIT 1) "
-                "RETURNING id, attempts, body",
+                "RETURNING id, attempts, body, kind",
                 (now + self.lease, now, now),
             ).fetchall()
         return Attempt(*rows[0]) if rows else None
@@ -234,8 +244,8 @@ def _job(row: Any) -> Job:
 
 
 def _given_up(what: str) -> str:
-    return f"The fit {what} in each of {MOST_CRASHES} attempts. Try fewer samples or a simpler model."
+    return f"The job {what} in each of {MOST_CRASHES} attempts. {ASK_FOR_LESS}"
 
 
 def _interrupted() -> str:
-    return f"The server stopped during each of {MOST_RESTARTS + 1} attempts. Submit the fit again once it is stable."
+    return f"The server stopped during each of {MOST_RESTARTS + 1} attempts. Submit the job again once it is stable."

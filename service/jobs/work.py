@@ -1,4 +1,4 @@
-"""What runs in the process of one attempt: read the samples, fit, send progress and then the result.
+"""What runs in the process of one attempt: read what was asked, compute, send progress and then the result.
 
 The fork server imports this module once, torch included (warm.py), and each attempt is a fork of it.
 """
@@ -11,6 +11,7 @@ import resource
 import signal
 import threading
 import time
+from collections.abc import Callable
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -20,35 +21,37 @@ import torch
 from brdfcore.errors import BrdfError
 from brdfcore.fitting import Progress, fit
 
+from .. import tables
 from ..datasets import Datasets
-from ..schemas import FitRequest
+from ..schemas import AlbedoRequest, FitRequest, JobKind
+from .store import ASK_FOR_LESS
 
 _PROGRESS_EVERY = 0.1  # [s]; each word of progress becomes a write to the disk
 
 _log = logging.getLogger("service.jobs")
 
 
-def run(out: Connection, data: str, body: bytes, memory: int) -> None:
+def run(out: Connection, data: str, kind: JobKind, body: bytes, memory: int) -> None:
     """Send ("progress", JSON) any number of times, then ("succeeded", JSON) or ("failed", sentence)."""
     _settle(memory)
     try:
-        out.send(("succeeded", _fitted(out, data, body)))
+        out.send(("succeeded", _WORK[kind](out, Path(data), body)))
     except BrdfError as error:
         out.send(("failed", str(error)))
     except Exception as error:
         if isinstance(error, MemoryError) or "allocate memory" in str(error):  # torch raises RuntimeError for it
-            sentence = f"Expected the fit to need less than {memory} bytes, but it asked for more. Use fewer samples."
+            sentence = f"Expected the job to need less than {memory} bytes, but it asked for more. {ASK_FOR_LESS}"
         else:
-            _log.exception("a fit raised")
+            _log.exception("a job raised")
             sentence = (
-                f"The fit stopped with an internal error, {type(error).__name__}. The server's log has the details."
+                f"The job stopped with an internal error, {type(error).__name__}. The server's log has the details."
             )
         out.send(("failed", sentence))
 
 
-def _fitted(out: Connection, data: str, body: bytes) -> str:
+def _fitted(out: Connection, data: Path, body: bytes) -> str:
     request = FitRequest.model_validate_json(body)
-    samples = Datasets(Path(data)).samples(request)
+    samples = Datasets(data).samples(request)
     last = -math.inf
 
     def report(progress: Progress) -> None:
@@ -59,18 +62,24 @@ def _fitted(out: Connection, data: str, body: bytes) -> str:
         loss = progress.loss if math.isfinite(progress.loss) else None
         out.send(("progress", json.dumps({"stage": progress.stage, "fraction": progress.fraction, "loss": loss})))
 
-    fitted = fit(
-        samples,
-        request.model,
-        loss=request.loss,
-        optimizer=request.optimizer,
-        fixed=request.fixed,
-        gray=tuple(request.gray),
-        per_channel=tuple(request.per_channel),
-        seed=request.seed,
-        progress=report,
-    )
+    fitted = fit(samples, **request.arguments(), progress=report)
     return json.dumps(fitted.to_dict(), allow_nan=False)
+
+
+def _tabulated(out: Connection, data: Path, body: bytes) -> str:
+    """Facts about the table, which itself is in the folder of tables under its hash."""
+    last = -math.inf
+
+    def report(fraction: float) -> None:
+        nonlocal last
+        if time.monotonic() - last >= _PROGRESS_EVERY or fraction >= 1:
+            last = time.monotonic()
+            out.send(("progress", json.dumps({"stage": "table", "fraction": fraction, "loss": None})))
+
+    return json.dumps(tables.made(AlbedoRequest.model_validate_json(body), data, report), allow_nan=False)
+
+
+_WORK: dict[JobKind, Callable[[Connection, Path, bytes], str]] = {"fit": _fitted, "albedo_table": _tabulated}
 
 
 def _settle(memory: int) -> None:

@@ -2,19 +2,23 @@
 
 import asyncio
 import hashlib
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 import brdfcore as bc
 from brdfcore import plots
+from brdfcore.errors import unknown_name
 
 from ..errors import ProblemError, responses
 from ..schemas import FitOutcome, FitRequest
 from ..state import State, state
 from ._http import require_accepted
-from .fits import absent, found
+from ._jobs import absent, found
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 router = APIRouter(prefix="/v1/fits/{fit_id}/plots", tags=["plots"])
 
@@ -33,27 +37,48 @@ class Lobes(BaseModel):
     channel: str | None = Field(None, description="which is drawn; the brightest, if none")
 
 
+class Albedo(BaseModel):
+    """What a plot of the albedo shows."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    phi_deg: float = Field(0.0, description="azimuth from which the sample is seen [degrees]")
+    channel: str | None = Field(None, description="which is drawn; the brightest, if none")
+
+
 @router.get("/lobes.svg", response_class=Response, responses=responses(404, 406, 409, 422))
 async def lobes_svg(request: Request, fit_id: str, asked: Annotated[Lobes, Query()]) -> Response:
     """The lobes in the plane of incidence and the measured points over them, as SVG."""
-    return await _lobes(request, fit_id, asked, "svg")
+    return await _plot(request, fit_id, asked, "svg")
 
 
 @router.get("/lobes.png", response_class=Response, responses=responses(404, 406, 409, 422))
 async def lobes_png(request: Request, fit_id: str, asked: Annotated[Lobes, Query()]) -> Response:
     """The lobes in the plane of incidence and the measured points over them, as PNG."""
-    return await _lobes(request, fit_id, asked, "png")
+    return await _plot(request, fit_id, asked, "png")
 
 
-async def _lobes(request: Request, fit_id: str, asked: Lobes, kind: Kind) -> Response:
+@router.get("/albedo.svg", response_class=Response, responses=responses(404, 406, 409, 422))
+async def albedo_svg(request: Request, fit_id: str, asked: Annotated[Albedo, Query()]) -> Response:
+    """The directional albedo of the fitted material, marked where it exceeds 1, as SVG."""
+    return await _plot(request, fit_id, asked, "svg")
+
+
+@router.get("/albedo.png", response_class=Response, responses=responses(404, 406, 409, 422))
+async def albedo_png(request: Request, fit_id: str, asked: Annotated[Albedo, Query()]) -> Response:
+    """The directional albedo of the fitted material, marked where it exceeds 1, as PNG."""
+    return await _plot(request, fit_id, asked, "png")
+
+
+async def _plot(request: Request, fit_id: str, asked: Lobes | Albedo, kind: Kind) -> Response:
     require_accepted(request, _MEDIA_TYPE[kind])
     service = state(request)
-    job = found(service, fit_id)
+    job = found(service, "fit", fit_id)
     if job.result is None:
         raise ProblemError(
             409, f"Expected the fit to have succeeded, but it is {job.status}. A plot needs a fit that has succeeded."
         )
-    shown = f"{bc.__version__} {job.id} {job.finished} {kind} {asked.model_dump_json()}"
+    shown = f"{bc.__version__} {job.id} {job.finished} {kind} {type(asked).__name__} {asked.model_dump_json()}"
     tag = f'"{hashlib.sha256(shown.encode()).hexdigest()[:32]}"'
     headers = {"etag": tag, "cache-control": "private, no-cache"}
     known = [name.strip().removeprefix("W/") for name in request.headers.get("if-none-match", "").split(",")]
@@ -61,16 +86,30 @@ async def _lobes(request: Request, fit_id: str, asked: Lobes, kind: Kind) -> Res
         return Response(status_code=304, headers=headers)
     body = service.store.body(fit_id)
     if body is None:
-        raise absent(fit_id)  # removed just now
+        raise absent("fit", fit_id)  # removed just now
     loop = asyncio.get_running_loop()
     image = await loop.run_in_executor(service.aside, _drawn, service, body, job.result, asked, kind)
     return Response(image, headers=headers, media_type=_MEDIA_TYPE[kind])
 
 
-def _drawn(service: State, body: bytes, result: str, asked: Lobes, kind: Kind) -> bytes:
-    samples = service.datasets.samples(FitRequest.model_validate_json(body))
-    material = bc.Material.from_json(FitOutcome.model_validate_json(result).material)
-    figure = plots.lobes(
-        material, samples, theta_i_deg=asked.theta_i_deg or None, scale=asked.scale, channel=asked.channel
-    )
+def _drawn(service: State, body: bytes, result: str, asked: Lobes | Albedo, kind: Kind) -> bytes:
+    outcome = FitOutcome.model_validate_json(result)
+    material = bc.Material.from_json(outcome.material)
+    if isinstance(asked, Lobes):
+        samples = service.datasets.samples(FitRequest.model_validate_json(body))
+        figure = plots.lobes(
+            material, samples, theta_i_deg=asked.theta_i_deg or None, scale=asked.scale, channel=asked.channel
+        )
+    else:
+        figure = _albedo(material, outcome, asked)
     return plots.to_bytes(figure, kind)
+
+
+def _albedo(material: bc.Material, outcome: FitOutcome, asked: Albedo) -> "Figure":
+    label, channel = outcome.material_text, None
+    if asked.channel is not None:
+        if asked.channel not in outcome.channels:
+            raise unknown_name("a channel", asked.channel, outcome.channels, field="channel")
+        channel = min(outcome.channels.index(asked.channel), material.channels - 1)
+        label += f", channel {asked.channel}"
+    return plots.albedo({label: material}, phi_deg=asked.phi_deg, channel=channel)

@@ -12,20 +12,20 @@ import torch
 from service.jobs import work
 
 
-def answers(out: Connection, data: str, body: bytes, memory: int) -> None:
+def answers(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
     out.send(("progress", '{"stage": "fit", "fraction": 0.5, "loss": null}'))
     out.send(("succeeded", body.decode().upper()))
 
 
-def refuses(out: Connection, data: str, body: bytes, memory: int) -> None:
+def refuses(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
     out.send(("failed", "Expected something else."))
 
 
-def dies(out: Connection, data: str, body: bytes, memory: int) -> None:
+def dies(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def dies_once(out: Connection, data: str, body: bytes, memory: int) -> None:
+def dies_once(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
     mark = pathlib.Path(data) / "died"
     if not mark.exists():
         mark.touch()
@@ -33,17 +33,17 @@ def dies_once(out: Connection, data: str, body: bytes, memory: int) -> None:
     out.send(("succeeded", "{}"))
 
 
-def hangs(out: Connection, data: str, body: bytes, memory: int) -> None:
+def hangs(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
     (pathlib.Path(data) / "pid").write_text(str(os.getpid()))
     time.sleep(600)
 
 
-def asks_for_too_much(out: Connection, data: str, body: bytes, memory: int) -> None:
+def asks_for_too_much(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
     work.fit = lambda *arguments, **keywords: torch.ones(2**31, dtype=torch.float64)  # 16 GiB
-    work.run(out, data, body, memory)
+    work.run(out, data, "fit", body, memory)
 
 
-def trips(out: Connection, data: str, body: bytes, memory: int) -> None:
+def trips(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
     logging.getLogger("service.jobs").addHandler(logging.FileHandler(pathlib.Path(data) / "log"))
     work.fit = lambda *arguments, **keywords: [][0]
-    work.run(out, data, body, memory)
+    work.run(out, data, "fit", body, memory)

@@ -23,6 +23,8 @@ from service.client import (
     FitFailedError,
     FitResult,
     FitUnfinishedError,
+    JobFailedError,
+    JobUnfinishedError,
     ProblemError,
     UnreachableError,
     WaitError,
@@ -249,3 +251,50 @@ def test_the_client_needs_no_torch() -> None:
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"
+
+
+def test_a_material_is_evaluated_and_integrated(client: Client) -> None:
+    material = bc.material("lambert(kd=[0.5, 0.2]) + ward_bounded(isotropic, rs=0.3, a=0.2)")
+    angles = {"theta_i_deg": np.array([30.0]), "phi_i_deg": [0], "theta_o_deg": [30], "phi_o_deg": [180.0]}
+    for given in (material, str(material), material.to_json()):
+        assert client.evaluate(given, **angles).material == str(material)  # type: ignore[arg-type]
+    wi, wo = (torch.tensor([w], dtype=torch.float64) for w in ([0.6, 0.0, 0.8], [0.0, 0.0, 1.0]))
+    assert client.evaluate(material, wi=wi, wo=wo).f == material.f(wi, wo).tolist()
+    found = client.albedo(material, np.array([0.0, 60.0]), phi_deg=10, tolerance=1e-3)
+    theta = torch.deg2rad(torch.tensor([0.0, 60.0], dtype=torch.float64))
+    own = bc.albedo(material, theta, tolerance=1e-3).values.tolist()
+    assert found.values == [pytest.approx(row, rel=1e-9) for row in own]
+    assert (found.met, found.tolerance, found.phi_deg) == (True, 1e-3, 10.0)
+    with pytest.raises(ProblemError, match="in full"):
+        client.evaluate(material, wi=wi)
+
+
+def test_a_table_is_made_and_fetched(client: Client, tmp_path: pathlib.Path) -> None:
+    table = client.albedo_table("oren_nayar(kd=0.5)", {"oren_nayar.sigma": (0.1, 0.8)}, tolerance=1e-3)
+    assert (table.job_status, table.result.met) == ("succeeded", True)
+    assert [axis.name for axis in table.result.axes] == ["theta_deg", "oren_nayar.sigma"]
+    assert repr(table).startswith(f"TableResult({table.id}, 'oren_nayar(")
+    for kind in ("npz", "json"):
+        file = tmp_path / f"table.{kind}"
+        file.write_bytes(table.content(kind))
+        assert bc.AlbedoTable.load(file).hash == table.result.hash
+    assert client.get_table(table.id).result == table.result
+    table.delete()
+    with pytest.raises(ProblemError, match="Expected the id of a table"):
+        table.refresh()
+
+
+def test_a_table_that_failed_or_is_not_made_is_an_exception() -> None:
+    request = {"material": "lambert", "axes": {}, "tolerance": 1e-4}
+    failed, running = (
+        fit_view(status, request=request, error=e) for status, e in (("failed", "No."), ("running", None))
+    )
+    with scripted(lambda _: httpx2.Response(200, json=failed)) as client, pytest.raises(JobFailedError, match="No"):
+        client.albedo_table("lambert")
+    with scripted(lambda _: httpx2.Response(202, json=running)) as client:
+        table = client.albedo_table("lambert", wait=False)
+        with pytest.raises(JobUnfinishedError, match=r"Expected table f1 to have succeeded, but it is running\."):
+            _ = table.result
+        with pytest.raises(WaitError, match="table f1 to finish in the time given"):
+            table.wait(timeout=0.01)
+        assert table.cancel().job_status == "running"

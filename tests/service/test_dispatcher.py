@@ -99,7 +99,7 @@ def test_a_child_that_keeps_dying_fails_in_words(store: JobStore, tmp_path: path
         failed = ended(store, store.submit("{}", b""))
     assert (failed.status, failed.attempts) == ("failed", 3)
     assert failed.error is not None
-    assert failed.error.startswith("The fit ended its process with exit code -9 in each of 3 attempts.")
+    assert failed.error.startswith("The job ended its process with exit code -9 in each of 3 attempts.")
 
 
 def test_an_oversize_fit_fails_alone(store: JobStore, tmp_path: pathlib.Path) -> None:
@@ -108,7 +108,8 @@ def test_an_oversize_fit_fails_alone(store: JobStore, tmp_path: pathlib.Path) ->
         failed = ended(store, store.submit("{}", body))
     assert (failed.status, failed.attempts) == ("failed", 1)
     assert failed.error == (
-        "Expected the fit to need less than 8589934592 bytes, but it asked for more. Use fewer samples."
+        "Expected the job to need less than 8589934592 bytes, but it asked for more. "
+        "Try fewer samples, fewer axes or a simpler model."
     )
 
 
@@ -117,7 +118,7 @@ def test_an_internal_error_fails_the_job_and_is_logged(store: JobStore, tmp_path
     with dispatching(store, tmp_path, attempts.trips):
         failed = ended(store, store.submit("{}", body))
     assert (failed.status, failed.attempts) == ("failed", 1)
-    assert failed.error == "The fit stopped with an internal error, IndexError. The server's log has the details."
+    assert failed.error == "The job stopped with an internal error, IndexError. The server's log has the details."
     assert "IndexError: list index out of range" in (tmp_path / "log").read_text()
 
 
@@ -138,7 +139,7 @@ def test_a_fit_beyond_its_time_fails(store: JobStore, tmp_path: pathlib.Path) ->
         assert gone(pid_of(tmp_path))
     assert failed.status == "failed"
     assert failed.error == (
-        "Expected the fit to end within 0.5 s, but it did not. Use fewer samples or a simpler model."
+        "Expected the job to end within 0.5 s, but it did not. Try fewer samples, fewer axes or a simpler model."
     )
 
 

@@ -106,7 +106,7 @@ def test_an_abandoned_job_fails_after_its_last_attempt(store: JobStore, clock: C
     assert failed is not None
     assert failed.status == "failed"
     assert failed.error is not None
-    assert failed.error.startswith("The fit was abandoned by its worker in each of 3 attempts.")
+    assert failed.error.startswith("The job was abandoned by its worker in each of 3 attempts.")
 
 
 def test_a_crash_is_retried_up_to_the_cap(store: JobStore) -> None:
@@ -117,7 +117,8 @@ def test_a_crash_is_retried_up_to_the_cap(store: JobStore) -> None:
     assert failed is not None
     assert (failed.status, failed.attempts) == ("failed", 3)
     assert failed.error == (
-        "The fit ended its process with exit code -9 in each of 3 attempts. Try fewer samples or a simpler model."
+        "The job ended its process with exit code -9 in each of 3 attempts. "
+        "Try fewer samples, fewer axes or a simpler model."
     )
     assert store.claim() is None
 
@@ -141,7 +142,7 @@ def test_restarts_are_no_crashes_but_have_a_cap_of_their_own(store: JobStore) ->
     failed = store.get(job.id)
     assert failed is not None
     assert failed.status == "failed"
-    assert failed.error == ("The server stopped during each of 21 attempts. Submit the fit again once it is stable.")
+    assert failed.error == ("The server stopped during each of 21 attempts. Submit the job again once it is stable.")
     assert claimed(store).id == waiting.id
 
 

@@ -1,0 +1,16 @@
+"""The material that a request means."""
+
+from typing import Any
+
+import brdfcore as bc
+from brdfcore.errors import BrdfError
+
+
+def material_of(given: str | dict[str, Any]) -> bc.Material:
+    """The material of a text, a preset's name or a material's JSON; an error names its field as the body does."""
+    try:
+        return bc.material(given) if isinstance(given, str) else bc.Material.from_json(given)
+    except BrdfError as error:
+        if error.field in (None, "model"):
+            error.field = "material"
+        raise

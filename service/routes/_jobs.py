@@ -1,0 +1,133 @@
+"""What the routes of every kind of job share: finding, waiting, cancelling, removing, and what is shown of a job."""
+
+import asyncio
+import json
+import re
+import time
+from datetime import UTC, datetime
+from typing import Any
+
+from fastapi import Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from ..errors import ProblemError
+from ..jobs.store import Job
+from ..schemas import FINISHED, JobKind
+from ..state import State, state
+
+_LONGEST_WAIT = 60.0  # [s]
+_NAME: dict[JobKind, str] = {"fit": "fit", "albedo_table": "table of albedos"}
+_PATH: dict[JobKind, str] = {"fit": "/v1/fits", "albedo_table": "/v1/albedo"}
+
+
+class Paging(BaseModel):
+    """Which part of a list."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    limit: int = Field(20, ge=1, le=100)
+    cursor: int | None = Field(None, ge=1, lt=2**63, description="`next` of the page before")
+
+
+async def accepted(request: Request, response: Response, job: Job) -> Job:
+    """The job that was submitted just now, after what the request prefers to wait; the response says how it stands."""
+    state(request).dispatcher.wake()
+    response.headers["location"] = f"{_PATH[job.kind]}/{job.id}"
+    seconds = _preferred_wait(request)
+    if seconds is not None:
+        response.headers["preference-applied"] = f"wait={seconds:g}"
+        job = await _finished(request, job, seconds)
+    if job.status in FINISHED:
+        response.status_code = 200
+    else:
+        response.status_code = 202
+        response.headers["retry-after"] = "1"
+    return job
+
+
+def page_of(service: State, kind: JobKind, paging: Paging) -> tuple[list[Job], str | None]:
+    """The jobs of a page, newest first, and the cursor of the next one."""
+    jobs = service.store.newest(paging.limit + 1, paging.cursor, kind)
+    shown = jobs[: paging.limit]
+    return shown, str(shown[-1].number) if len(jobs) > len(shown) else None
+
+
+def found(service: State, kind: JobKind, job_id: str) -> Job:
+    """The job of that kind and id; 404 where there is none."""
+    job = service.store.get(job_id)
+    if job is None or job.kind != kind:
+        raise absent(kind, job_id)
+    return job
+
+
+def absent(kind: JobKind, job_id: str) -> ProblemError:
+    """The 404 for a job that does not exist."""
+    return ProblemError(404, f"Expected the id of a {_NAME[kind]}, got {job_id!r}. GET {_PATH[kind]} lists them.")
+
+
+async def cancelled(service: State, kind: JobKind, job_id: str) -> Job:
+    """The job, cancelled just now or before; 409 where it has ended otherwise."""
+    found(service, kind, job_id)
+    job = await asyncio.to_thread(service.store.cancel, job_id)
+    if job is None:
+        raise absent(kind, job_id)
+    if job.status != "cancelled":
+        raise ProblemError(
+            409, f"Expected the {_NAME[kind]} to be queued or running, but it has {job.status}. Nothing to cancel."
+        )
+    service.dispatcher.wake()
+    return job
+
+
+async def removed(service: State, kind: JobKind, job_id: str) -> Job:
+    """The job as it was before it was removed for good."""
+    job = found(service, kind, job_id)
+    if not await asyncio.to_thread(service.store.delete, job_id):
+        raise absent(kind, job_id)
+    service.dispatcher.wake()
+    return job
+
+
+def summary(job: Job) -> dict[str, Any]:
+    """What is shown of a job of any kind, without its result."""
+    return {
+        "id": job.id,
+        "status": job.status,
+        "progress": json.loads(job.progress) if job.progress else None,
+        "request": json.loads(job.request),
+        "error": job.error,
+        "attempts": job.attempts,
+        "created": _time(job.created),
+        "started": _time(job.started),
+        "finished": _time(job.finished),
+    }
+
+
+def view(job: Job) -> dict[str, Any]:
+    """The summary and the result."""
+    return {**summary(job), "result": json.loads(job.result) if job.result else None}
+
+
+def _preferred_wait(request: Request) -> float | None:
+    """The seconds of `Prefer: wait=N` (RFC 7240), capped; what cannot be read is no preference."""
+    match = re.search(
+        r"(?:^|[,;])\s*wait\s*=\s*\"?(\d{1,9})\"?\s*(?:$|[,;])", ",".join(request.headers.getlist("prefer"))
+    )
+    return min(float(match[1]), _LONGEST_WAIT) if match else None
+
+
+async def _finished(request: Request, job: Job, seconds: float) -> Job:
+    """The job when it has ended, or as it stands after so long or when the server is about to end."""
+    begun = time.monotonic()
+    while job.status not in FINISHED and not request.app.state.ending():
+        waited = time.monotonic() - begun
+        if waited >= seconds:
+            break
+        # a tenth of the time so far: the answer is at most that late, and a long wait asks rarely
+        await asyncio.sleep(min(max(waited / 10, 0.01), 0.5, seconds - waited))
+        job = found(state(request), job.kind, job.id)
+    return job
+
+
+def _time(seconds: float | None) -> datetime | None:
+    return None if seconds is None else datetime.fromtimestamp(seconds, UTC)

@@ -1,0 +1,141 @@
+"""Directional albedos: values at once, tables as jobs."""
+
+import asyncio
+import json
+import math
+from typing import Annotated
+
+import torch
+from fastapi import APIRouter, Depends, Query, Request, Response
+
+import brdfcore as bc
+from brdfcore.energy._described import described
+
+from .. import tables
+from ..errors import ProblemError, inlined, responses
+from ..jobs.store import Job
+from ..materials import material_of
+from ..schemas import AlbedoRequest, AlbedoView, TablePage, TableSummary, TableView
+from ..state import State, state
+from . import _jobs
+from ._http import accepted_of, json_accepted, json_content, parsed
+
+router = APIRouter(prefix="/v1/albedo", tags=["albedo"])
+
+_JSON = [Depends(json_accepted)]
+_JSON_LIMIT = 2**20  # bytes
+_MOST_INTEGRALS = 500  # directions times terms; a tenth of a second each where a lobe is hard and the tolerance small
+_MOST_CHANNELS = 64  # each may be a lobe of its own
+_TOLERANCE = 1e-6  # where a request states none
+_NPZ = ("application/x-npz", "application/octet-stream")
+_BODY = {"required": True, "content": {"application/json": {"schema": inlined(AlbedoRequest)}}}
+_FILE = {kind: {"schema": {"format": "binary"}} for kind in _NPZ} | {"application/json": {"schema": {"type": "object"}}}
+
+
+@router.post(
+    "",
+    dependencies=_JSON,
+    response_class=Response,
+    responses={
+        200: {"model": AlbedoView | TableView, "description": "the values, or a finished table"},
+        202: {"model": TableView, "description": "a table, accepted"},
+        **responses(406, 408, 413, 415, 422),
+    },
+    openapi_extra={"requestBody": _BODY},
+)
+async def albedo(request: Request) -> Response:
+    """Give directional albedos at once, each with its error, or accept a table over angles and parameters as a job.
+
+    A table answers as a fit does: 202 and where to look, or with `Prefer: wait=N` the finished job.
+    """
+    content = await json_content(request, _JSON_LIMIT)
+    service = state(request)
+    asked = await asyncio.to_thread(parsed, AlbedoRequest, content)
+    if asked.axes is None:
+        loop = asyncio.get_running_loop()
+        answer = await loop.run_in_executor(service.computing, _values, asked)
+        return Response(answer, media_type="application/json")
+    response = Response(media_type="application/json")
+    job = await asyncio.to_thread(_submitted, service, asked, content)
+    job = await _jobs.accepted(request, response, job)
+    response.body = TableView(**_jobs.view(job)).model_dump_json().encode()
+    response.headers["content-length"] = str(len(response.body))
+    return response
+
+
+@router.get("", dependencies=_JSON, responses=responses(406, 422))
+async def page(request: Request, paging: Annotated[_jobs.Paging, Query()]) -> TablePage:
+    """Tables without their results, newest first."""
+    jobs, following = _jobs.page_of(state(request), "albedo_table", paging)
+    return TablePage(items=[TableSummary(**_jobs.summary(job)) for job in jobs], next=following)
+
+
+@router.get("/{table_id}", dependencies=_JSON, responses=responses(404, 406, 422))
+async def read(request: Request, table_id: str) -> TableView:
+    """A table: its status and progress, and once it has succeeded, its axes, its error and what it cost."""
+    return TableView(**_jobs.view(_jobs.found(state(request), "albedo_table", table_id)))
+
+
+@router.get(
+    "/{table_id}/table",
+    response_class=Response,
+    responses={200: {"content": _FILE}, **responses(404, 406, 409, 422)},
+)
+async def table(request: Request, table_id: str) -> Response:
+    """The table's numbers as JSON, which says how to read them, or as a NumPy archive, by the Accept header."""
+    media_type = accepted_of(request, ("application/json", *_NPZ))
+    service = state(request)
+    job = _jobs.found(service, "albedo_table", table_id)
+    if job.result is None:
+        raise ProblemError(
+            409, f"Expected the table to have succeeded, but it is {job.status}. Its numbers come when it has."
+        )
+    name, kind = json.loads(job.result)["hash"], "npz" if media_type in _NPZ else "json"
+    content = await asyncio.to_thread(tables.content, service.settings.data, name, kind)
+    if content is None:  # removed just now with another job that had made the same table
+        raise ProblemError(404, f"Expected the numbers of the table {table_id!r} to be kept. Post its request again.")
+    return Response(content, media_type=media_type, headers={"vary": "accept"})
+
+
+@router.post("/{table_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 409, 422))
+async def cancel(request: Request, table_id: str) -> TableView:
+    """Cancel a table that is queued or running; its process ends at once."""
+    return TableView(**_jobs.view(await _jobs.cancelled(state(request), "albedo_table", table_id)))
+
+
+@router.delete("/{table_id}", dependencies=_JSON, status_code=204, responses=responses(404, 406, 422))
+async def remove(request: Request, table_id: str) -> None:
+    """Remove a table for good, cancelling it first where it is not finished."""
+    service = state(request)
+    job = await _jobs.removed(service, "albedo_table", table_id)
+    if job.result is not None:
+        await asyncio.to_thread(_forget, service, json.loads(job.result)["hash"])
+
+
+def _forget(service: State, name: str) -> None:
+    """Remove the numbers of a table, unless another job made the same."""
+    if not service.store.mentioned("albedo_table", name):
+        tables.remove(service.settings.data, name)
+
+
+def _submitted(service: State, asked: AlbedoRequest, content: bytes) -> Job:
+    """The new job, once all of its request that can be checked before the work has been checked."""
+    return service.store.submit(json.dumps(tables.checked(asked)), content, "albedo_table")
+
+
+def _values(asked: AlbedoRequest) -> str:
+    """The albedos as JSON."""
+    material, theta_deg = material_of(asked.material), asked.theta_deg or []
+    integrals = len(theta_deg) * len(material.form.terms)
+    if integrals > _MOST_INTEGRALS or material.channels > _MOST_CHANNELS:
+        raise ProblemError(
+            422,
+            f"Expected at most {_MOST_INTEGRALS} angles times terms and {_MOST_CHANNELS} channels, got {integrals} and "
+            f"{material.channels}. Ask in several requests, or for a table.",
+            field="theta_deg",
+        )
+    theta = torch.deg2rad(torch.tensor(theta_deg, dtype=torch.float64))
+    tolerance = _TOLERANCE if asked.tolerance is None else asked.tolerance
+    with torch.no_grad():
+        found = bc.albedo(material, theta, math.radians(asked.phi_deg), tolerance)
+    return json.dumps(described(material, theta_deg, asked.phi_deg, found), allow_nan=False)
