@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
-from torch.func import jvp
 
-from .problem import Data, Problem
+from .problem import Problem
 
 NORMAL_QUANTILE = 1.959963984540054  # leaves 2.5 % above it
 _PRESSED = 1e-7  # cosine between residuals and a column of J below which nothing presses a value against its end
 _RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding: J's own digits, squared
+_SILENT = 1e-12  # of the data: a value whose raw unit moves the residuals by less is lost in their rounding
 _ALONE = 1e-9  # a sample with 1 - leverage below this determines a value alone, so its noise cannot be seen
 
 
@@ -42,16 +42,17 @@ class Uncertainty:
 def uncertainty(problem: Problem, x: Tensor) -> Uncertainty:
     """The uncertainties of the optimum x (D,)."""
     counted = int((problem.data.root_weight.expand_as(problem.data.y) > 0).sum())
+    weighed = problem.data.sigma is not None and problem.plan.robust is None
     if problem.size == 0:
         return Uncertainty(x, x, x, x.bool(), x.bool(), counted)
     gram = problem.gram(x.unsqueeze(0))
     matrix = gram.matrix[0]
     pressed = gram.gradient[0].abs() > _PRESSED * (matrix.diagonal() * gram.loss).sqrt()
     held = problem.held(x.unsqueeze(0), gram.gradient)[0] & pressed
-    undetermined = _undetermined(matrix, held)
+    undetermined = _undetermined(matrix, held, _SILENT**2 * float(problem.squares()))
     at = (~(held | undetermined)).nonzero().squeeze(-1)
     error, factor = (torch.full_like(x, math.nan) for _ in range(2))
-    if at.numel() and (counted > at.numel() or problem.data.sigma is not None):
+    if at.numel() and (counted > at.numel() or weighed):
         part = matrix[at][:, at]
         scale = part.diagonal().rsqrt()
         inverse = torch.zeros_like(matrix)  # scaled while it is inverted: widths and reflectances differ by 1e4
@@ -59,7 +60,7 @@ def uncertainty(problem: Problem, x: Tensor) -> Uncertainty:
         inverse[at.unsqueeze(-1), at] = scale.unsqueeze(-1) * scaled * scale
         variance, freedom = _variances(problem, x, inverse)
         error[at] = variance[at].sqrt()
-        factor[at] = NORMAL_QUANTILE if problem.data.sigma is not None else t_quantile(freedom[at])
+        factor[at] = NORMAL_QUANTILE if weighed else t_quantile(freedom[at])
     return Uncertainty(*_natural(problem, x, error, factor), undetermined, held, counted - at.numel())
 
 
@@ -68,35 +69,28 @@ def _variances(problem: Problem, x: Tensor, inverse: Tensor) -> tuple[Tensor, Te
     by_channel = inverse[problem.index]  # (C, P, D)
     own = torch.stack([inverse[index][:, index] for index in problem.index])  # (C, P, P)
     variance, even, even_squared = (torch.zeros(problem.size, dtype=torch.float64) for _ in range(3))
-    for data in problem.chunks(problem.data.y.shape[1] * (problem.size + 3 * len(problem.keys))):
-        residuals, columns = problem.jacobian(x, data)
-        influence = torch.einsum("ncp,cpd->ncd", columns, by_channel).square()
-        if data.sigma is not None:
-            spread = _known_variance(problem, x, data)
+    for data in problem.data.chunks(problem.channels * (1 + len(problem.keys))):
+        residuals, columns = problem.jacobian(x, data)  # (C, N), (C, P, N)
+        influence = (by_channel.mT @ columns).square()  # (C, D, N)
+        if data.sigma is not None and problem.plan.robust is None:
+            slope = problem.residuals(problem.f(x.unsqueeze(0), data), data, None)[2]
+            spread = (slope * data.sigma)[0].square()
         else:
-            left = 1 - torch.einsum("ncp,cpq,ncq->nc", columns, own, columns)
+            left = 1 - (columns * (own @ columns)).sum(1)
             spread = torch.where(left > _ALONE, (residuals / left.clamp(min=_ALONE)).square(), math.inf)
-        touched = influence > 1e-24 * inverse.diagonal()  # an infinite variance concerns only whom it reaches
-        variance += torch.where(touched, influence * spread.unsqueeze(-1), 0.0).sum((0, 1))
-        alike = influence * data.root_weight.square().expand_as(residuals).unsqueeze(-1)  # as if noise were constant
-        even += alike.sum((0, 1))
-        even_squared += alike.square().sum((0, 1))
+        touched = influence > 1e-24 * inverse.diagonal().unsqueeze(-1)  # an infinite variance concerns whom it reaches
+        variance += torch.where(touched, influence * spread.unsqueeze(1), 0.0).sum((0, 2))
+        alike = influence * data.root_weight[0].square().unsqueeze(1)  # as if noise were constant
+        even += alike.sum((0, 2))
+        even_squared += alike.square().sum((0, 2))
     return variance, (even.square() / even_squared.clamp(min=1e-300)).clamp(min=1)
 
 
-def _known_variance(problem: Problem, x: Tensor, data: Data) -> Tensor:
-    """The variances of the residuals (N, C) that follow from the samples' sigma."""
-    f = problem.f(x, data)
-    ones = torch.ones_like(f)
-    slope = jvp(lambda v: problem.loss_kind.difference(v, data.y, data.c, problem.scales), (f,), (ones,))[1]
-    return torch.square(data.root_weight * slope * data.sigma)
-
-
-def _undetermined(matrix: Tensor, held: Tensor) -> Tensor:
+def _undetermined(matrix: Tensor, held: Tensor, silent: float) -> Tensor:
     """Which values take part in a direction along which no residual changes, (D,) bool."""
     diagonal = matrix.diagonal()
-    blind = ~held & (diagonal <= 0)
-    at = (~held & (diagonal > 0)).nonzero().squeeze(-1)
+    blind = ~held & (diagonal <= silent)
+    at = (~held & ~blind).nonzero().squeeze(-1)
     if at.numel():
         scale = diagonal[at].rsqrt()
         eigenvalues, vectors = torch.linalg.eigh(scale.unsqueeze(-1) * matrix[at][:, at] * scale)

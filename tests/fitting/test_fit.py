@@ -38,7 +38,7 @@ def test_every_optimizer_reaches_the_same_optimum(optimizer: str) -> None:
         assert max(p.loss for p in seen if p.stage == "fit") > 1.05 * best
     assert fit.status == "converged"
     assert fit.objective == pytest.approx(best, rel=1e-8)
-    assert fit.cost.optimizer == ("least_squares" if optimizer == "auto" else optimizer)
+    assert fit.cost.optimizer == ("variable_projection" if optimizer == "auto" else optimizer)
 
 
 MATERIALS = {
