@@ -127,21 +127,21 @@ def _not_too_steep(samples: Samples, max_theta: float | None) -> Samples:
 
 def results(found: Found, fitted: Sequence[Samples], given: Sequence[Samples], seed: int, say: "Teller") -> list[Fit]:
     """What each material's optimum is worth."""
-    results = []
+    problem, outcome = found.problem, found.outcome
+    plan, before = problem.plan, problem.evaluations
+    say("uncertainty", 0.95, float(outcome.loss.min()))
+    known_of_all = uncertainty(problem, outcome.x)
+    f = torch.cat([problem.f(outcome.x, piece) for piece in problem.data.chunks(len(given))], dim=-1)  # (M, C, N)
+    evaluations = (found.evaluations + problem.evaluations - before) // len(given)
+    fits = []
     for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
-        problem = found.problem if len(fitted) == 1 else found.problem.of_material(row)
-        plan = problem.plan
-        x, minimum = found.outcome.x[row], float(found.outcome.loss[row])
-        converged = bool(found.outcome.converged[row])
-        say("uncertainty", 0.95, minimum)
-        before = problem.evaluations
-        known = uncertainty(problem, x)
+        x, minimum = outcome.x[row], float(outcome.loss[row])
+        converged, known = bool(outcome.converged[row]), known_of_all.of_material(row)
         material = Material(plan.form, {key: value.detach() for key, value in problem.unpack(x).items()})
         parameters, standard_errors, intervals, undetermined = _described(problem, material, known, samples.channels)
-        error = errors(material, samples)
+        error = _errors(f[row].T, samples)
         weighed = problem.loss_kind.statistical and samples.sigma is not None and samples.weight is None
-        say("done", 1.0, minimum)
-        result = Fit(
+        fit = Fit(
             material=material,
             parameters=parameters,
             standard_errors=standard_errors,
@@ -156,20 +156,15 @@ def results(found: Found, fitted: Sequence[Samples], given: Sequence[Samples], s
             fixed=tuple(sorted(plan.fixed)),
             gray=tuple(sorted(plan.gray)),
             per_channel=tuple(sorted(plan.per_channel)),
-            chi_square=_chi_square(material, samples, known),
-            cost=Cost(
-                0.0,
-                found.evaluations // len(given) + problem.evaluations - before,
-                found.iterations,
-                found.starts,
-                found.optimizer,
-            ),
+            chi_square=_chi_square(f[row].T, samples, known),
+            cost=Cost(0.0, evaluations, found.iterations, found.starts, found.optimizer),
             channels=samples.channels,
             samples_report=samples.report(),
             provenance={"version": __version__, "torch": torch.__version__, "seed": seed, "input": whole.hash},
         )
-        results.append(result)
-    return results
+        fits.append(fit)
+    say("done", 1.0, float(outcome.loss.min()))
+    return fits
 
 
 class Teller:
@@ -190,9 +185,13 @@ class Teller:
 
 def errors(material: Material, samples: Samples) -> dict[str, float]:
     """The material's error under every loss by its definition, and `cosine_rms`, the root of the cosine loss's mean."""
+    return _errors(_evaluated(material, samples), samples)
+
+
+def _errors(f: Tensor, samples: Samples) -> dict[str, float]:
+    """The errors of values f (N, C)."""
     c = samples.wi[:, 2:]
     scales = Scales.of(samples.values, c)
-    f = _evaluated(material, samples)
     found = {}
     for name, kind in LOSSES.items():
         weight = weights(samples, kind)
@@ -211,12 +210,11 @@ def _evaluated(material: Material, samples: Samples) -> Tensor:
         return torch.cat([material.f(wi, wo) for wi, wo in pairs]).expand_as(samples.values)
 
 
-def _chi_square(material: Material, samples: Samples, known: Uncertainty) -> tuple[float, int] | None:
+def _chi_square(f: Tensor, samples: Samples, known: Uncertainty) -> tuple[float, int] | None:
     """The sum of ((f - y) / sigma)^2 and its degrees of freedom, where sigma is known."""
     if samples.sigma is None:
         return None
-    f = _evaluated(material, samples)
-    return float(((f - samples.values) / samples.sigma).square().sum()), known.freedom
+    return float(((f - samples.values) / samples.sigma).square().sum()), int(known.freedom)
 
 
 def _described(

@@ -10,7 +10,7 @@ from ..formats.samples import Samples
 from ..geometry import Geometry, geometry
 from .losses import Loss, Scales
 
-_CHUNK = 65536  # samples times starts of one piece: what a basis computes on the way stays in the cache
+_CHUNK = 32768  # samples times starts of one piece: what a basis computes on the way stays in the cache
 
 
 @dataclass(frozen=True)

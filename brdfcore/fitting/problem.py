@@ -63,12 +63,6 @@ class Problem:
         self.columns = Columns(plan.form, plan.start, self.keys, self.data.slice(0, 2).g)
         self.evaluations = 0
 
-    def of_material(self, row: int) -> "Problem":
-        """The problem of one of the materials."""
-        at = torch.tensor([row])
-        scale = None if self.robust_scale is None else self.robust_scale[at]
-        return Problem(self.plan, [], self.loss_kind, None, scale, self.data.rows(at))
-
     def _raw_bounds(self) -> tuple[Tensor, Tensor]:
         sides: list[list[Tensor]] = [[], []]
         for key in self.keys:
@@ -159,13 +153,12 @@ class Problem:
             total += self.residuals(self.f(x, data), data, which)[0].sum((1, 2))
         return total
 
-    def jacobian(self, x: Tensor, data: Data) -> tuple[Tensor, Tensor]:
-        """Residuals (C, N) of one raw vector (D,) and their derivatives (C, P, N), one column a parameter name."""
-        row = x.unsqueeze(0)
-        columns = self.columns.all(self.natural(row), data.g, 1, self.channels)
-        mix = self.mix(row)
-        _, r, slope = self.residuals(_mixed(mix.value, columns), data, None)
-        return r[0], (slope.unsqueeze(2) * (mix.slopes.transpose(2, 3) @ columns))[0]
+    def jacobian(self, x: Tensor, data: Data, which: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor]:
+        """Residuals (S, C, N), their derivatives (S, C, P, N), one column a parameter name, and their slopes by f."""
+        columns = self.columns.all(self.natural(x), data.g, len(x), self.channels)
+        mix = self.mix(x)
+        _, r, slope = self.residuals(_mixed(mix.value, columns), data, which)
+        return r, slope.unsqueeze(2) * (mix.slopes.transpose(2, 3) @ columns), slope
 
     def gram(self, x: Tensor, which: Tensor | None = None) -> Gram:
         """The normal equations at each row."""

@@ -72,11 +72,23 @@ class Projection:
                 ends[0, self.place[:, i]] = block.low.expand(problem.channels)
                 ends[1, self.place[:, i]] = block.high.expand(problem.channels)
         self.low, self.high = ends
+        # two points of each unknown, in the box: a total minus it stops at its own ends, so is a line only within
+        boxed = torch.tensor([group.kind == "scale" for group in self.groups for _ in range(group.count)])
+        low, high = self.low[self.place], self.high[self.place]
+        self.base = torch.where(boxed, low, 0.0)  # (C, L)
+        self.step = torch.where(boxed & (high > low), high - low, 1.0)
 
     @property
     def useful(self) -> bool:
         """Whether there is something to solve for."""
         return bool(self.groups)
+
+    @property
+    def may_leave_the_box(self) -> bool:
+        """Whether what is solved for may lie outside the box: an absorbed kd, or a pair solved in no triangle."""
+        kinds = [group.kind for group in self.groups]
+        triangles = self.useful and self.faces is not None
+        return ("absorbed" in kinds and "pair" in kinds) or (not triangles and bool({"pair", "absorbed"} & set(kinds)))
 
     def _blocks(self, solvers: int) -> tuple[Block, ...]:
         """The blocks of the polytope; kd <= 1 of what a pair's f0 absorbs is no plane and is left out."""
@@ -101,9 +113,9 @@ class Projection:
         """The coefficients as functions of the unknowns at the shapes of x (S, D)."""
         problem, starts = self.problem, len(x)
         natural = problem.natural(x)
-        corners = torch.cat([torch.zeros(1, self.count), torch.eye(self.count)]).to(x)
+        corners = self.base + torch.cat([torch.zeros(1, self.count), torch.eye(self.count)]).to(x)[:, None] * self.step
         found = natural_of(self.groups, corners, {key: torch.zeros(1).to(x) for key in self.unknown_keys})
-        at = {key: value.reshape(-1, 1, 1, 1) for key, value in found.items()}
+        at = {key: value[:, None, None] for key, value in found.items()}  # (L + 1, 1, 1, C)
         shape = (self.count + 1, starts, 1, problem.channels)
         values = {**natural, **at}
         c = problem.columns.coefficients(values, shape).squeeze(2)  # (L + 1, S, C, K)
@@ -112,7 +124,11 @@ class Projection:
             d = problem.columns.coefficient_slopes(values, shape).squeeze(2) * problem.chain(x).unsqueeze(-2)
         else:
             d = c.new_zeros(1, 1, 1, 1, names).expand(*c.shape, names)
-        return Affine(c[0], (c[1:] - c[0]).movedim(0, -1), d[0], (d[1:] - d[0]).movedim(0, -2))
+        step = self.step.T[:, None, :, None]  # (L, 1, C, 1)
+        a, a_slopes = (c[1:] - c[0]) / step, (d[1:] - d[0]) / step.unsqueeze(-1)
+        base = self.base.T[:, None, :, None]
+        offset, offset_slopes = c[0] - (a * base).sum(0), d[0] - (a_slopes * base.unsqueeze(-1)).sum(0)
+        return Affine(offset, a.movedim(0, -1), offset_slopes, a_slopes.movedim(0, -2))
 
     def products(self, x: Tensor, which: Tensor | None, *, derivatives: bool) -> Products:
         """The products at each row x (S, D), its own material's data: (S, W, Q, Q), (S, C, Q), (S, C)."""

@@ -125,7 +125,7 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
         raced = variable_projection(projection, x, which, _RACE, on_step=tell)
         iterations += raced.iterations
         if linear:
-            outcome = raced
+            outcome = least_squares(coarse, raced.x, which, on_step=tell) if projection.may_leave_the_box else raced
         else:
             x = torch.cat([starts, raced.x.reshape(starts.shape)], dim=1).reshape(-1, whole.size)
             which = torch.arange(materials).repeat_interleave(2 * each)

@@ -140,6 +140,7 @@ def solve_box(gram: Tensor, right: Tensor, low: Tensor, high: Tensor) -> tuple[T
     diagonal = gram.diagonal(dim1=-2, dim2=-1)
     scale = torch.where(diagonal > 0, diagonal.clamp(min=1e-300).rsqrt(), 1.0)
     gram = scale.unsqueeze(-1) * gram * scale.unsqueeze(-2)
+    ends = low, high
     right, low, high = right * scale, low / scale, high / scale
     small = 1e-13 * right.abs().amax(-1, keepdim=True)
     side = torch.zeros_like(right)  # -1 on the low end, 1 on the high one
@@ -159,4 +160,5 @@ def solve_box(gram: Tensor, right: Tensor, low: Tensor, high: Tensor) -> tuple[T
             last = wrong.shape[-1] - 1 - wrong.flip(-1).int().argmax(-1, keepdim=True)
             wrong &= torch.zeros_like(wrong).scatter_(-1, last, value=True)
         side = torch.where(wrong, torch.where(free, torch.where(z < low, -1.0, 1.0), 0.0), side)
-    return torch.minimum(torch.maximum(z, low), high) * scale, side == 0
+    inside = torch.minimum(torch.maximum(z * scale, ends[0]), ends[1])
+    return torch.where(side < 0, ends[0], torch.where(side > 0, ends[1], inside)), side == 0
