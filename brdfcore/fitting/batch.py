@@ -10,9 +10,10 @@ import numpy as np
 
 from ..errors import SamplesError
 from ..formats.samples import Samples
-from ._fit import Teller, planned, results
+from ._fit import Teller, planned
 from .result import Fit
 from .search import search
+from .worth import fits
 
 _AT_ONCE = 4_000_000  # values of all materials that are fitted at once
 
@@ -40,13 +41,13 @@ def fit_batch(several: Iterable[Samples], model: str, **keywords: Any) -> list[F
             say = Teller(progress, done / len(every), len(here) / len(every))
             seed = keywords.get("seed", 0)
             loss, optimizer = keywords.get("loss", "cosine"), keywords.get("optimizer", "auto")
-            fits = results(
-                search(plan, several_, loss, optimizer, seed, say), several_, [every[i] for i in here], seed, say
-            )
-            seconds = (time.perf_counter() - clock) / len(here)
-            for i, one in zip(here, fits, strict=True):
-                found[i] = replace(one, cost=replace(one.cost, seconds=seconds))
+            ends = search(plan, several_, loss, optimizer, seed, say)
+            say("uncertainty", 0.95, float(ends.outcome.loss.min()))
+            made = fits(ends.problem, ends.outcome, several_, [every[i] for i in here], seed, ends.cost(len(here)))
+            cost = replace(made[0].cost, seconds=(time.perf_counter() - clock) / len(here))
+            found.update({i: replace(one, cost=cost) for i, one in zip(here, made, strict=True)})
             done += len(here)
+            say("done", 1.0, float(ends.outcome.loss.min()))
     return [found[i] for i in range(len(every))]
 
 

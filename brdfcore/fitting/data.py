@@ -28,15 +28,12 @@ class Data:
     def of(cls, samples: Sequence[Samples], needs: frozenset[str], loss: Loss, scales: Scales | None) -> "Data":
         """The data of samples with equal directions; the scales are theirs unless they are given."""
         first = samples[0]
-        root_weight = [root_weights(one, loss).T for one in samples]
-        if all(w is root_weight[0] or torch.equal(w, root_weight[0]) for w in root_weight[1:]):
-            root_weight = root_weight[:1]
         sigmas = [one.sigma.T for one in samples if one.sigma is not None]
         return cls(
             geometry(first.wi, first.wo, needs),
             first.wi[:, 2].contiguous(),
             torch.stack([one.values.T for one in samples]),
-            torch.stack(root_weight),
+            _alike([root_weights(one, loss) for one in samples]),
             torch.stack(sigmas) if len(sigmas) == len(samples) else None,
             scales or Scales.stacked([Scales.of(one.values, one.wi[:, 2:]) for one in samples]),
         )
@@ -71,6 +68,18 @@ class Data:
         step = max(1, _CHUNK // max(1, starts))
         for begin in range(0, count, step):
             yield self.slice(begin, min(begin + step, count)) if step < count else self
+
+
+def _alike(several: Sequence[Tensor]) -> Tensor:
+    """The weights (N, 1) or (N, C) of several materials, (M, 1, N) or (M, C, N), and M = 1 where they are equal."""
+    if all(torch.equal(one, several[0]) for one in several[1:]):
+        several = several[:1]
+    return torch.stack([one.T for one in several])
+
+
+def stacked_weights(samples: Sequence[Samples], loss: Loss) -> Tensor:
+    """The weights of several materials, (M, 1, N), or (1, 1, N) where they are equal."""
+    return _alike([weights(one, loss) for one in samples])
 
 
 def weights(samples: Samples, loss: Loss) -> Tensor:

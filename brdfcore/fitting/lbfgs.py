@@ -27,6 +27,8 @@ def lbfgs(
         return torch.tensor(loss, dtype=torch.float64)
 
     best = float(closure())
+    if on_step is not None:
+        on_step(0, best * scaled.unit)
     done = 0
     stale = 0
     while done < max_iterations and stale < 2:

@@ -28,7 +28,7 @@ class Plan:
     per_channel: frozenset[str]
     choices: tuple[str, ...]
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # narrower boxes of the user's
-    starts: tuple[dict[str, Tensor], ...] = ()  # the user's, beside that of the text
+    starts: tuple[dict[str, Tensor], ...] = ()  # the user's: the text's where it has values, and more
     robust: str | None = None
     robust_scale: float | None = None
     max_theta: float | None = None  # [rad]
@@ -98,7 +98,7 @@ def plan(
     for key, tie in form.ties.items():
         _check_tie(form, key, tie, channels, start, fixed)
     narrowed = checked_bounds(form, bounds, start, {*given, *fixed})
-    further = []
+    further = [start] if set(given) - set(fixed) else []
     for values in starts:
         if not isinstance(values, Mapping):
             raise ParameterError(

@@ -20,14 +20,14 @@ from .losses import LOSSES
 from .plan import Plan
 from .problem import Problem
 from .projection import Projection
+from .result import Cost
 from .robust import ROBUST, SPREAD
 from .starts import scan
 from .variable_projection import variable_projection
 
 SUBSET = 2000  # samples on which starts are told apart; the optimum is always polished on all
-_STARTS = 4  # best points of the scan of one lobe, which run as one batch
-_MANY_STARTS = 16  # the same of two lobes and more, whose optima are many
-_MANY_SHAPES = 4  # shapes from which on a material counts as such
+_STARTS = {0: 1, 1: 2, 2: 4, 3: 4}  # best points of the scan by the number of shapes; they run as one batch
+_MANY_STARTS = 16  # the same of more shapes, and of two lobes, whose optima are many
 _DESCENTS = 2  # starts of Adam and LBFGS, which run one after the other
 _POLISH = 300  # their steps on all the data, after the subset
 _RACE = 1e-4  # of the loss: what another step would gain once a start's end is clear
@@ -45,6 +45,10 @@ class Found:
     evaluations: int
     iterations: int
     optimizer: str
+
+    def cost(self, materials: int) -> Cost:
+        """What each of so many materials cost but for the time, which ends later; uncertainty evaluates once more."""
+        return Cost(0.0, self.evaluations // materials + 1, self.iterations, self.starts, self.optimizer)
 
 
 def search(plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, seed: int, say: Say) -> Found:
@@ -113,7 +117,8 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     materials = whole.materials
     projection = _kindred(coarse, few)
     linear = projection.problem is coarse
-    count = _STARTS if len(projection.shapes) < _MANY_SHAPES else _MANY_STARTS
+    shapes = [coarse.keys[p].split(".")[0] for p in projection.shapes]
+    count = _MANY_STARTS if len(set(shapes)) > 1 else _STARTS.get(len(shapes), _MANY_STARTS)
     starts = scan(coarse, projection, count, seed)
     each = starts.shape[1]
     which = torch.arange(materials).repeat_interleave(each)

@@ -11,15 +11,16 @@ from torch import Tensor
 from .problem import Problem
 from .projection import Projection
 
-SCAN_POINTS = 256
+SCAN_POINTS = {0: 1, 1: 32, 2: 128}  # by the number of shapes
+_POINTS = 256  # where there are more
 _AT_ONCE = 64  # points: the products of that many stay small
 
 
 def scan(problem: Problem, projection: Projection, count: int, seed: int) -> Tensor:
-    """Raw vectors (M, S, D) to start from: the user's own, then up to twice `count` of a seeded scan's best."""
+    """Raw vectors (M, S, D) to start from: the user's, then up to twice `count` of a seeded scan's best."""
     materials = problem.materials
-    own = torch.stack([problem.pack(values) for values in (problem.plan.start, *problem.plan.starts)])
-    own = own.expand(materials, -1, -1)
+    own = [problem.pack(values) for values in problem.plan.starts]
+    given = torch.stack(own) if own else torch.zeros(0, problem.size, dtype=torch.float64)
     points = _points(problem, projection, seed)
     solved = points.expand(materials, -1, -1)
     best: list[Tensor] = []
@@ -31,22 +32,21 @@ def scan(problem: Problem, projection: Projection, count: int, seed: int) -> Ten
         loss = problem.loss(solved.reshape(-1, problem.size), which).reshape(materials, -1)
         best.append(torch.where(loss.isfinite(), loss, torch.inf).argsort(dim=1)[:, :count])
     index = torch.cat(best, dim=1).unsqueeze(-1).expand(-1, -1, problem.size)
-    return torch.cat([own, solved.gather(1, index)], dim=1)
+    return torch.cat([given.expand(materials, -1, -1), solved.gather(1, index)], dim=1)
 
 
 def _points(problem: Problem, projection: Projection, seed: int) -> Tensor:
     """Sobol points (S, D) over the shapes' search ranges, one value for all channels; elsewhere the text's start."""
     own = problem.pack(problem.plan.start)
     shapes = [problem.keys[p] for p in projection.shapes]
-    points = own.repeat(SCAN_POINTS if shapes else 1, 1)
+    count = SCAN_POINTS.get(len(shapes), _POINTS)
+    points = own.repeat(count + 1, 1) if shapes else own.unsqueeze(0)  # the text's own shapes are the last point
     if shapes:
-        unit = torch.quasirandom.SobolEngine(len(shapes), scramble=True, seed=seed).draw(
-            SCAN_POINTS, dtype=torch.float64
-        )
+        unit = torch.quasirandom.SobolEngine(len(shapes), scramble=True, seed=seed).draw(count, dtype=torch.float64)
         for column, key in enumerate(shapes):
             parameter = problem.plan.form.parameters[key]
             low, high = parameter.to_raw(torch.tensor(problem.plan.search_range(key), dtype=torch.float64))
-            points[:, problem.slices[key]] = (low + (high - low) * unit[:, column]).unsqueeze(-1)
+            points[:count, problem.slices[key]] = (low + (high - low) * unit[:, column]).unsqueeze(-1)
     return points.clamp(problem.low, problem.high)
 
 
