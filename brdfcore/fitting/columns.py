@@ -9,13 +9,15 @@ nothing of torch.func, whose first use takes seconds (nor autograd's grad_output
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import torch
 from torch import Tensor
 
 from ..geometry import Geometry
+from ..models._fresnel_lobe import FresnelTerm
 from ..models.form import Form
+from ..models.fresnel import schlick
 
 Natural = Mapping[str, Tensor]  # key -> (S, 1, 1) or (S, 1, C), or (), (C,) for what is the same in all S
 
@@ -41,6 +43,7 @@ class Columns:
             reads = [_reached(basis, every) for basis in bases]
             mixes = [_reached(coefficient, every) for coefficient in coefficients]
         self.bases = len(bases)
+        self.multiples = self._multiples()
         self.wide = any(basis.shape[-1] > 1 for basis in bases)  # shapes that have colour
         self.derivatives = [(k, p) for k, found in enumerate(reads) for p in found]  # which basis, by which key
         self.coefficient_derivatives = [(k, p) for k, found in enumerate(mixes) for p in found]
@@ -54,6 +57,17 @@ class Columns:
             bases.extend(term.model.basis(own, g))
             coefficients.extend(term.model.coefficients(own))
         return bases, coefficients
+
+    def _multiples(self) -> dict[int, int]:
+        """The bases that are Schlick's s times the basis before them, by index: their columns need no derivation."""
+        found: dict[int, int] = {}
+        at = 0
+        for term in self.form.terms:
+            two = isinstance(term.model, FresnelTerm) and term.model.fresnel and not term.model.exact
+            if two:
+                found[at + 1] = at
+            at += 2 if two else len(term.model.typical_albedo)
+        return found
 
     def _coefficients(self, values: Natural) -> list[Tensor]:
         return [
@@ -77,12 +91,22 @@ class Columns:
             slopes: list[Tensor] = []
             for k, basis in enumerate(bases):
                 by = [repeated[p] for j, p in self.derivatives if j == k]
-                if by:
+                if k in self.multiples:
+                    slopes += [schlick(g.h_dot_wo) * slope for slope in slopes[len(slopes) - len(by) :]]
+                elif by:
                     slopes += torch.autograd.grad(basis.sum(), by, retain_graph=True)
         return self._stacked([basis.detach() for basis in bases] + slopes, starts, width, count)
 
     def _bases(self, values: Natural, g: Geometry) -> list[Tensor]:
-        return [basis for term in self.form.terms for basis in term.model.basis(self.form.of_term(term, values), g)]
+        found: list[Tensor] = []
+        for term in self.form.terms:
+            own = self.form.of_term(term, values)
+            if len(found) + 1 in self.multiples:
+                lobe = cast(FresnelTerm, term.model).lobe(own, g)
+                found += [lobe, lobe.detach() * schlick(g.h_dot_wo)]
+            else:
+                found.extend(term.model.basis(own, g))
+        return found
 
     def _stacked(self, columns: list[Tensor], starts: int, width: int, count: int) -> Tensor:
         out = columns[0].new_empty(starts, width, len(columns), count)

@@ -33,7 +33,7 @@ class Data:
             geometry(first.wi, first.wo, needs),
             first.wi[:, 2].contiguous(),
             torch.stack([one.values.T for one in samples]),
-            _alike([root_weights(one, loss) for one in samples]),
+            stacked_weights(samples, loss).sqrt() if not sigmas else _alike([root_weights(s, loss) for s in samples]),
             torch.stack(sigmas) if len(sigmas) == len(samples) else None,
             scales or Scales.stacked([Scales.of(one.values, one.wi[:, 2:]) for one in samples]),
         )
@@ -79,6 +79,8 @@ def _alike(several: Sequence[Tensor]) -> Tensor:
 
 def stacked_weights(samples: Sequence[Samples], loss: Loss) -> Tensor:
     """The weights of several materials, (M, 1, N), or (1, 1, N) where they are equal."""
+    if all(one.weight is None and one.cell is None for one in samples):
+        samples = samples[:1]
     return _alike([weights(one, loss) for one in samples])
 
 

@@ -29,6 +29,7 @@ class Outcome(NamedTuple):
     loss: Tensor  # (S,)
     converged: Tensor  # (S,) bool
     iterations: int
+    gram: Gram | None = None  # the normal equations there, of all values, where they are known
 
     def pick(self, index: Tensor) -> "Outcome":
         """The rows of an index."""
@@ -98,4 +99,4 @@ def levenberg_marquardt(
             part[moved] = found[better]
         if on_step is not None:
             on_step(done, float(gram.loss.min()))
-    return Outcome(x, gram.loss, converged, done)
+    return Outcome(x, gram.loss, converged, done, gram)

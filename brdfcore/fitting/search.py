@@ -22,12 +22,12 @@ from .problem import Problem
 from .projection import Projection
 from .result import Cost
 from .robust import ROBUST, SPREAD
-from .starts import scan
+from .starts import scan, several_lobes
 from .variable_projection import variable_projection
 
 SUBSET = 2000  # samples on which starts are told apart; the optimum is always polished on all
-_STARTS = {0: 1, 1: 2, 2: 4, 3: 4}  # best points of the scan by the number of shapes; they run as one batch
-_MANY_STARTS = 16  # the same of more shapes, and of two lobes, whose optima are many
+_STARTS = 4  # best points of the scan, which run as one batch; of one shape half of them
+_MANY_STARTS = 16  # the same of two lobes and more, whose optima are many
 _DESCENTS = 2  # starts of Adam and LBFGS, which run one after the other
 _POLISH = 300  # their steps on all the data, after the subset
 _RACE = 1e-4  # of the loss: what another step would gain once a start's end is clear
@@ -55,7 +55,9 @@ def search(plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, se
     """The best optimum that the scan's starts lead to, for each of the materials that share their directions."""
     say("scan", 0.0, torch.nan)
     if plan.robust is None or plan.robust_scale is not None:
-        given = None if plan.robust_scale is None else torch.full((len(samples),), plan.robust_scale).double()
+        given = (
+            None if plan.robust_scale is None else torch.full((len(samples),), plan.robust_scale, dtype=torch.float64)
+        )
         return _found(plan, samples, loss, optimizer, seed, say, given)
     # outliers inflate the spread about the plain optimum, so it is taken again about the robust one
     plain = _found(replace(plan, robust=None), samples, loss, optimizer, seed, _part(say, 0.0, 0.4), None)
@@ -117,8 +119,8 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     materials = whole.materials
     projection = _kindred(coarse, few)
     linear = projection.problem is coarse
-    shapes = [coarse.keys[p].split(".")[0] for p in projection.shapes]
-    count = _MANY_STARTS if len(set(shapes)) > 1 else _STARTS.get(len(shapes), _MANY_STARTS)
+    few_starts = _STARTS if len(projection.shapes) > 1 else _STARTS // 2
+    count = _MANY_STARTS if several_lobes(projection) else few_starts
     starts = scan(coarse, projection, count, seed)
     each = starts.shape[1]
     which = torch.arange(materials).repeat_interleave(each)
@@ -175,7 +177,7 @@ def _descents(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer
         if coarse is not whole:
             best = run(whole, best.x, which, max_iterations=_POLISH)
         ends.append(Outcome(best.x, best.loss, best.converged, sum(r.iterations for r in runs)))
-    x, loss, converged, steps = zip(*ends, strict=True)
+    x, loss, converged, steps, _ = zip(*ends, strict=True)
     outcome = Outcome(torch.cat(x), torch.cat(loss), torch.cat(converged), sum(steps))
     evaluations = whole.evaluations + (coarse.evaluations if coarse is not whole else 0)
     return Found(whole, outcome, starts.shape[1], evaluations, sum(steps), optimizer)

@@ -89,7 +89,11 @@ def solve_faces(faces: Faces, gram: Tensor, right: Tensor) -> tuple[Tensor, Tens
     channels, count = shape[-2:]
     gram = gram.expand(*shape, count).reshape(-1, channels, count, count)
     right = right.expand(shape).reshape(-1, channels, count)
-    z, face = _best(faces, faces.origin[: faces.lower], faces.directions[: faces.lower], gram, right)
+    z, face = _best(faces, faces.origin[:1], faces.directions[:1], gram, right)
+    below = faces.outside(z, below=True).any(-1)
+    if bool(below.any()):
+        lower = faces.origin[: faces.lower], faces.directions[: faces.lower]
+        z[below], face[below] = _best(faces, *lower, gram[below], right[below])
     beyond = faces.outside(z, below=False)
     if bool(beyond.any()):
         rows, channel = beyond.nonzero(as_tuple=True)
@@ -106,10 +110,17 @@ def _best(
     start = origin.unsqueeze(0)  # (1, F, C, L)
     d = directions.unsqueeze(1)  # (F, 1, L, L)
     g, r = gram.unsqueeze(1), right.unsqueeze(1)  # (B, 1, C, L, L), (B, 1, C, L)
-    slope = r - (g @ start.unsqueeze(-1)).squeeze(-1)
-    t = solve_definite(d.mT @ g @ d, (d.mT @ slope.unsqueeze(-1)).squeeze(-1))
-    z = start + (d @ t.unsqueeze(-1)).squeeze(-1)  # (B, F, C, L)
-    value = (z * ((g @ z.unsqueeze(-1)).squeeze(-1) - 2 * r)).sum(-1)
+    slope = r - (g * start.unsqueeze(-2)).sum(-1) if bool(origin.any()) else r
+    if within:
+        system, wanted = d.mT @ g @ d, (d.mT @ slope.unsqueeze(-1)).squeeze(-1)
+        t = solve_definite(system, wanted)
+        z = start + (d @ t.unsqueeze(-1)).squeeze(-1)  # (B, F, C, L)
+    else:  # along axes: no products of tiny matrices
+        e = d.diagonal(dim1=-2, dim2=-1)
+        system, wanted = g * e.unsqueeze(-1) * e.unsqueeze(-2), slope * e
+        t = solve_definite(system, wanted)
+        z = start + t
+    value = -(t * wanted).sum(-1) - (start * (slope + r)).sum(-1)
     wrong = faces.outside(z, below=True)
     if within:
         wrong |= faces.outside(z, below=False)
@@ -120,19 +131,28 @@ def _best(
 def solve_definite(matrix: Tensor, right: Tensor) -> Tensor:
     """The solutions of small positive semidefinite systems (..., L, L), (..., L), 0 where a diagonal is 0.
 
-    Gauss and Jordan without pivots on the scaled matrix, all systems at once: LAPACK would be called for each.
+    Cholesky's elimination of the scaled matrix, written out by element so that all systems are eliminated at once:
+    LAPACK would be called for each.
     """
-    diagonal = matrix.diagonal(dim1=-2, dim2=-1)
-    scale = torch.where(diagonal > 0, diagonal.clamp(min=1e-300).rsqrt(), 0.0)
-    scaled = scale.unsqueeze(-1) * matrix * scale.unsqueeze(-2)
     count = matrix.shape[-1]
-    ridge = torch.where(diagonal > 0, _RIDGE, 1.0)
-    both = torch.cat([scaled + torch.diag_embed(ridge), (scale * right).unsqueeze(-1)], dim=-1)
+    diagonal = [matrix[..., i, i] for i in range(count)]
+    scale = [torch.where(x > 0, x.clamp(min=1e-300).rsqrt(), 0.0) for x in diagonal]
+    m = [[matrix[..., i, j] * scale[i] * scale[j] for j in range(i)] for i in range(count)]
+    d = [torch.where(x > 0, 1 + _RIDGE, 1.0) for x in diagonal]
+    b = [right[..., i] * scale[i] for i in range(count)]
     for j in range(count):
-        row = both[..., j, :] / both[..., j, j : j + 1].clamp(min=_RIDGE)
-        both = both - both[..., :, j : j + 1] * row.unsqueeze(-2)
-        both[..., j, :] = row
-    return torch.mul(scale, both[..., -1])
+        pivot = d[j].clamp(min=_RIDGE)
+        for i in range(j + 1, count):
+            factor = m[i][j] / pivot
+            for k in range(j + 1, i):
+                m[i][k] = m[i][k] - factor * m[k][j]
+            d[i] = d[i] - factor * m[i][j]
+            b[i] = b[i] - factor * b[j]
+    for i in reversed(range(count)):
+        for k in range(i + 1, count):
+            b[i] = b[i] - m[k][i] * b[k]
+        b[i] = b[i] / d[i].clamp(min=_RIDGE)
+    return torch.stack([scale[i] * b[i] for i in range(count)], dim=-1)
 
 
 def solve_box(gram: Tensor, right: Tensor, low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:

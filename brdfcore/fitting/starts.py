@@ -11,8 +11,8 @@ from torch import Tensor
 from .problem import Problem
 from .projection import Projection
 
-SCAN_POINTS = {0: 1, 1: 32, 2: 128}  # by the number of shapes
-_POINTS = 256  # where there are more
+_POINTS = 32  # of a scan for each shape of a lone lobe
+_MANY_POINTS = 256  # where there are more, or two lobes, whose optima are many
 _AT_ONCE = 64  # points: the products of that many stay small
 
 
@@ -35,11 +35,16 @@ def scan(problem: Problem, projection: Projection, count: int, seed: int) -> Ten
     return torch.cat([given.expand(materials, -1, -1), solved.gather(1, index)], dim=1)
 
 
+def several_lobes(projection: Projection) -> bool:
+    """Whether the shapes belong to more than one term."""
+    return len({projection.problem.keys[p].split(".")[0] for p in projection.shapes}) > 1
+
+
 def _points(problem: Problem, projection: Projection, seed: int) -> Tensor:
     """Sobol points (S, D) over the shapes' search ranges, one value for all channels; elsewhere the text's start."""
     own = problem.pack(problem.plan.start)
     shapes = [problem.keys[p] for p in projection.shapes]
-    count = SCAN_POINTS.get(len(shapes), _POINTS)
+    count = _MANY_POINTS if several_lobes(projection) else min(_POINTS * len(shapes), _MANY_POINTS)
     points = own.repeat(count + 1, 1) if shapes else own.unsqueeze(0)  # the text's own shapes are the last point
     if shapes:
         unit = torch.quasirandom.SobolEngine(len(shapes), scramble=True, seed=seed).draw(count, dtype=torch.float64)

@@ -15,10 +15,11 @@ the others and has no interval; a combination of values that the data leave free
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from .problem import Problem
+from .problem import Gram, Problem
 
 NORMAL_QUANTILE = 1.959963984540054  # leaves 2.5 % above it
 _PRESSED = 1e-7  # cosine between residuals and a column of J below which nothing presses a value against its end
@@ -43,14 +44,14 @@ class Uncertainty:
         return Uncertainty(*(getattr(self, name)[row] for name in self.__dataclass_fields__))
 
 
-def uncertainty(problem: Problem, x: Tensor) -> Uncertainty:
-    """The uncertainties of the optima x (M, D), one a material of the problem."""
+def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncertainty:
+    """The uncertainties of the optima x (M, D), one a material of the problem, whose normal equations may be known."""
     which = torch.arange(len(x))
     counted = (problem.data.root_weight.expand_as(problem.data.y) > 0).sum((1, 2))
     known_noise = problem.data.sigma is not None and problem.plan.robust is None
     if problem.size == 0:
         return Uncertainty(x, x, x, x.bool(), x.bool(), counted)
-    gram = problem.gram(x, which)
+    gram = gram or problem.gram(x, which)
     matrix, diagonal = gram.matrix, gram.matrix.diagonal(dim1=-2, dim2=-1)
     pressed = gram.gradient.abs() > _PRESSED * (diagonal * gram.loss.unsqueeze(-1)).sqrt()
     held = problem.held(x, gram.gradient) & pressed
@@ -85,18 +86,21 @@ def _variances(problem: Problem, x: Tensor, which: Tensor, inverse: Tensor) -> t
     for piece in problem.data.chunks(problem.channels * len(x)):
         data = piece.rows(which)
         residuals, columns, slope = problem.jacobian(x, data, which)  # (M, C, N), (M, C, P, N), (M, C, N)
-        influence = (by_channel.mT @ columns).square()  # (M, C, D, N)
+        influence = (by_channel.mT @ columns).square_()  # (M, C, D, N)
         if data.sigma is not None and problem.plan.robust is None:
             spread = (slope * data.sigma).square()
         else:
             left = 1 - (columns * (own @ columns)).sum(2)
             spread = torch.where(left > _ALONE, (residuals / left.clamp(min=_ALONE)).square(), math.inf)
-        # an infinite variance concerns only whom it reaches
-        touched = influence > 1e-24 * inverse.diagonal(dim1=-2, dim2=-1)[:, None, :, None]
-        variance += torch.where(touched, influence * spread.unsqueeze(2), 0.0).sum((1, 3))
-        alike = influence * data.root_weight.square().unsqueeze(2)  # as if noise were constant
-        even += alike.sum((1, 3))
-        even_squared += alike.square().sum((1, 3))
+        if bool(spread.isfinite().all()):
+            variance += (influence @ spread.unsqueeze(-1)).sum((1, 3))
+        else:  # an infinite variance concerns only whom it reaches
+            touched = influence > 1e-24 * inverse.diagonal(dim1=-2, dim2=-1)[:, None, :, None]
+            variance += torch.where(touched, influence * spread.unsqueeze(2), 0.0).sum((1, 3))
+        if data.sigma is None or problem.plan.robust is not None:
+            weight = data.root_weight.square().expand_as(residuals).unsqueeze(-1)  # as if noise were constant
+            even += (influence @ weight).sum((1, 3))
+            even_squared += (influence.square_() @ weight.square()).sum((1, 3))
     return variance, (even.square() / even_squared.clamp(min=1e-300)).clamp(min=1)
 
 
@@ -138,14 +142,12 @@ def t_quantile(freedom: Tensor) -> Tensor:
     )
     many = z + sum((term / freedom**k for k, term in enumerate(expansion, start=1)), torch.zeros_like(freedom))
     few = freedom.clamp(max=1000)
-    nodes = torch.linspace(0, 1, 401, dtype=torch.float64)
-    simpson = torch.ones_like(nodes)
-    simpson[1:-1:2], simpson[2:-1:2] = 4, 2
+    gauss = np.polynomial.legendre.leggauss(24)
+    nodes, rule = torch.from_numpy(0.5 * (gauss[0] + 1)), torch.from_numpy(0.5 * gauss[1])
     log_norm = torch.lgamma((few + 1) / 2) - torch.lgamma(few / 2) - 0.5 * math.log(math.pi)
     theta = torch.atan(1.9 / few.sqrt())  # below that of infinitely many degrees
     for _ in range(8):
         cosines = torch.cos(theta.unsqueeze(-1) * nodes)
-        density = torch.exp(log_norm.unsqueeze(-1) + (few.unsqueeze(-1) - 1) * torch.log(cosines))
-        below = (density @ simpson) * theta / 1200
-        theta = theta + (0.475 - below) / density[..., -1]
+        below = torch.exp(log_norm.unsqueeze(-1) + (few.unsqueeze(-1) - 1) * torch.log(cosines)) @ rule * theta
+        theta = theta + (0.475 - below) / torch.exp(log_norm + (few - 1) * torch.log(torch.cos(theta)))
     return torch.where(freedom < 1000, few.sqrt() * torch.tan(theta), many)

@@ -25,4 +25,5 @@ def variable_projection(
     problem = projection.problem
     floor = _ROUNDING * problem.squares()
     floor = floor.expand(len(x)) if which is None else floor[which]
-    return levenberg_marquardt(problem, evaluate, x, floor, tolerance, max_iterations, on_step)
+    found = levenberg_marquardt(problem, evaluate, x, floor, tolerance, max_iterations, on_step)
+    return found._replace(gram=None)  # that of the shapes alone

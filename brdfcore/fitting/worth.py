@@ -23,7 +23,7 @@ def fits(
     """What each material's optimum is worth; `given` are the samples before any were left out."""
     plan, x, channels = problem.plan, outcome.x, fitted[0].channels
     weighed = problem.loss_kind.statistical and fitted[0].sigma is not None and fitted[0].weight is None
-    known = uncertainty(problem, x)
+    known = uncertainty(problem, x, outcome.gram)
     f = torch.cat([problem.f(x, piece) for piece in problem.data.chunks(len(x))], dim=-1)  # (M, C, N)
     values = {key: value.squeeze(1).expand(len(x), -1) for key, value in _rows(problem, x).items()}
     described = _described(problem, values, known, channels)

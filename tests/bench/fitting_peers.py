@@ -12,26 +12,15 @@ import brdfcore as bc
 class NumpyMaterial:
     """lambert + lobes of Ward's bounded kind or Kurt's, isotropic or not: residuals c (f - y) and their Jacobian.
 
-    x holds kd (C), then for each lobe its ks (C), for Kurt's f0, the widths, and for Kurt's alpha. What the directions
-    decide is computed once.
+    x holds kd (C), then for each lobe its ks (C), for Kurt's f0, the widths, and for Kurt's alpha. A model function as
+    users write it is one of directions and parameters; `tuned`, what the directions decide is computed once.
     """
 
-    def __init__(self, samples: bc.Samples, lobe: str, lobes: int, widths: int) -> None:
-        wi, wo = samples.wi.numpy(), samples.wo.numpy()
-        h = wi + wo
-        self.p2, self.q2 = (h[:, 0] / h[:, 2]) ** 2, (h[:, 1] / h[:, 2]) ** 2
-        e2 = self.p2 + self.q2
-        ci, co = wi[:, 2], wo[:, 2]
-        self.kurt = lobe == "kurt"
-        if self.kurt:
-            cosine = 0.5 * np.sqrt((h**2).sum(1))
-            self.front = (1 + e2) ** 2 / (4 * np.pi * cosine)
-            self.s = (1 - cosine) ** 5
-            self.log = np.log(ci * co)
-        else:
-            self.front = (1 + e2) / (np.pi * h[:, 2] ** 2)
-        self.c, self.y = ci[:, None], samples.values.numpy()
-        self.cy = self.c * self.y
+    def __init__(self, samples: bc.Samples, lobe: str, lobes: int, widths: int, *, tuned: bool = False) -> None:
+        self.wi, self.wo = samples.wi.numpy(), samples.wo.numpy()
+        self.kurt, self.tuned = lobe == "kurt", tuned
+        self.y = samples.values.numpy()
+        self._prepare()
         self.channels, self.lobes, self.widths = self.y.shape[1], lobes, widths
         self.each = self.channels + widths + 2 * self.kurt
         size = self.channels + lobes * self.each
@@ -41,6 +30,22 @@ class NumpyMaterial:
             begin = self.channels + lobe_ * self.each + self.channels + self.kurt
             self.low[begin : begin + widths], self.high[begin : begin + widths] = 1e-4, 10
             self.width_at += range(begin, begin + widths)
+
+    def _prepare(self) -> None:
+        """What the directions decide."""
+        h = self.wi + self.wo
+        self.p2, self.q2 = (h[:, 0] / h[:, 2]) ** 2, (h[:, 1] / h[:, 2]) ** 2
+        e2 = self.p2 + self.q2
+        ci, co = self.wi[:, 2], self.wo[:, 2]
+        if self.kurt:
+            cosine = 0.5 * np.sqrt((h**2).sum(1))
+            self.front = (1 + e2) ** 2 / (4 * np.pi * cosine)
+            self.s = (1 - cosine) ** 5
+            self.log = np.log(ci * co)
+        else:
+            self.front = (1 + e2) / (np.pi * h[:, 2] ** 2)
+        self.c = ci[:, None]
+        self.cy = self.c * self.y
 
     def start(self, widths: list[float], reflectance: float = 0.2) -> np.ndarray:
         """A start with these widths of the lobes."""
@@ -72,6 +77,8 @@ class NumpyMaterial:
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """The residuals c (f - y), flat."""
+        if not self.tuned:
+            self._prepare()
         f = np.broadcast_to(x[: self.channels] / np.pi, self.y.shape)
         for lobe in range(self.lobes):
             ks, value, fresnel, _ = self._lobe(x, lobe)
@@ -80,6 +87,8 @@ class NumpyMaterial:
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Its derivatives."""
+        if not self.tuned:
+            self._prepare()
         out = np.zeros((*self.y.shape, len(x)))
         channel = np.arange(self.channels)
         out[:, channel, channel] = self.c / np.pi

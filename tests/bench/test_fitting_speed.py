@@ -1,8 +1,11 @@
 """Times of fits as ratios to scipy's least_squares (trf) and lmfit, which ran by turns with them on the same data.
 
-A peer gets one start and hand-written numpy; a fit chooses its own starts, and computes intervals and every error too.
+A peer gets one random start in the ranges of our scan, and hand-written numpy, of directions and parameters as users
+write it, or tuned: with all that the directions decide computed beforehand. A fit chooses its own starts, and computes
+intervals and every error too.
 """
 
+import itertools
 import pathlib
 import subprocess
 import sys
@@ -51,14 +54,18 @@ def test_a_hundred_thousand_samples(show) -> None:
     """Anisotropic, RGB, 10 parameters."""
     text = "lambert(kd=[.1,.2,.3]) + kurt(anisotropic, ks=[.3,.4,.5], f0=.2, mx=.15, my=.3, alpha=.25)"
     samples = measured(text, 100_000)
-    peer = NumpyMaterial(samples, "kurt", 1, 2)
-    start, ends = peer.start([0.1]), {}
+    peer, tuned = (NumpyMaterial(samples, "kurt", 1, 2, tuned=tuned) for tuned in (False, True))
+    random, ends = np.random.default_rng(0), {}
+    points = [peer.random_start(random) for _ in range(3)]
+    start = itertools.cycle(points).__next__
     times = by_turns(
         {
             "ours": lambda: ends.update(ours=bc.fit(samples, "lambert + kurt(anisotropic)").objective),
-            "trf": lambda: ends.update(trf=peer.trf(start, analytic=False)[0]),
-            "trf, analytic": lambda: ends.update(analytic=peer.trf(start, analytic=True)[0]),
-            "lmfit": lambda: ends.update(lmfit=peer.lmfit(start)),
+            "trf": lambda: ends.update(trf=peer.trf(start(), analytic=False)[0]),
+            "trf, analytic": lambda: ends.update(analytic=peer.trf(start(), analytic=True)[0]),
+            "trf, tuned": lambda: ends.update(tuned=tuned.trf(start(), analytic=False)[0]),
+            "trf, analytic, tuned": lambda: ends.update(both=tuned.trf(start(), analytic=True)[0]),
+            "lmfit": lambda: ends.update(lmfit=peer.lmfit(start())),
         },
         rounds=3,
     )
@@ -81,13 +88,20 @@ def test_a_batch_of_a_hundred_materials(show, case: str) -> None:
         ]
         model, lobe = "lambert + kurt(isotropic)", "kurt"
     peers = [NumpyMaterial(samples, lobe, 1, 1) for samples in several]
-    start, ends = peers[0].start([0.1]), {}
+    tuned = [NumpyMaterial(samples, lobe, 1, 1, tuned=True) for samples in several]
+    ends: dict[str, list[float]] = {}
     fit_batch(several[:2], model)
+
+    def loop(peers: list[NumpyMaterial], *, analytic: bool) -> list[float]:
+        random = np.random.default_rng(0)
+        return [peer.trf(peer.random_start(random), analytic=analytic)[0] for peer in peers]
+
     times = by_turns(
         {
             "ours": lambda: ends.update(ours=[fit.objective for fit in fit_batch(several, model)]),
-            "loop of trf": lambda: ends.update(trf=[peer.trf(start, analytic=False)[0] for peer in peers]),
-            "loop of trf, analytic": lambda: [peer.trf(start, analytic=True) for peer in peers],
+            "loop of trf": lambda: ends.update(trf=loop(peers, analytic=False)),
+            "loop of trf, analytic": lambda: loop(peers, analytic=True),
+            "loop of trf, tuned": lambda: loop(tuned, analytic=False),
         },
         rounds=3,
     )
@@ -101,6 +115,7 @@ def test_two_hundred_random_starts(show) -> None:
     """222 samples, 3 parameters: every start, ours in one batch."""
     samples = plain(0)
     peer, random = NumpyMaterial(samples, "ward", 1, 1), np.random.default_rng(0)
+    tuned = NumpyMaterial(samples, "ward", 1, 1, tuned=True)
     points = [peer.random_start(random) for _ in range(200)]
     starts = [{"lambert.kd": p[0], "ward_bounded.rs": p[1], "ward_bounded.a": p[2]} for p in points]
     ends: dict[str, list[float]] = {}
@@ -110,6 +125,7 @@ def test_two_hundred_random_starts(show) -> None:
             "ours": lambda: ends.update(ours=[bc.fit(samples, GLOSSY, starts=starts).objective]),
             "trf": lambda: ends.update(trf=[peer.trf(p, analytic=False)[0] for p in points]),
             "trf, analytic": lambda: ends.update(analytic=[peer.trf(p, analytic=True)[0] for p in points]),
+            "trf, tuned": lambda: ends.update(tuned=[tuned.trf(p, analytic=False)[0] for p in points]),
         },
         rounds=3,
     )
@@ -142,8 +158,8 @@ print(time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_m
 def test_a_file_of_merls_size(show) -> None:
     """Two of Kurt's lobes, RGB, 15 parameters.
 
-    One trf start takes minutes: two of its evaluations, each with derivatives, are timed on all the data, and counted as
-    often as it needs on a fiftieth of the data from the same start.
+    One trf start takes minutes: two of its evaluations, each with derivatives, are timed on all the data, and counted
+    as often as it needs on a fiftieth of the data from the same start.
     """
     samples = measured(TWO, MERL)
     small = NumpyMaterial(samples.subset(torch.arange(0, MERL, 50)), "kurt", 2, 1)
@@ -156,7 +172,8 @@ def test_a_file_of_merls_size(show) -> None:
     times = {k: seconds(lambda k=k: peer.trf(start, analytic=k == "analytic", limit=2)) / 2 * steps[k] for k in steps}
     ratios = {f"trf, {name}, {steps[name]} evaluations": each / ours for name, each in times.items()}
     show(
-        f"MERL size, two lobes, RGB, {starts:.0f} starts: ours {ours:.1f} s, {peak:.2f} GB at most, {before:.2f} before; "
+        f"MERL size, two lobes, RGB, {starts:.0f} starts: ours {ours:.1f} s, {peak:.2f} GB at most, {before:.2f} before"
+        "; "
         f"{report(ratios)} (floor 20 against trf with differences, aim 40)"
     )
     assert peak <= 3
