@@ -2,7 +2,7 @@
 
 from torch import Tensor
 
-from .levenberg_marquardt import OnStep, Outcome, levenberg_marquardt
+from .levenberg_marquardt import DECREMENT, OnStep, Outcome, levenberg_marquardt
 from .problem import Gram, Problem
 
 _ROUNDING = 1e-26  # of the data's own squares: residuals of the 13th digit
@@ -12,6 +12,7 @@ def least_squares(
     problem: Problem,
     x: Tensor,
     which: Tensor | None = None,
+    tolerance: float = DECREMENT,
     max_iterations: int = 200,
     on_step: OnStep | None = None,
 ) -> Outcome:
@@ -22,4 +23,4 @@ def least_squares(
 
     floor = _ROUNDING * problem.squares()
     floor = floor.expand(len(x)) if which is None else floor[which]
-    return levenberg_marquardt(problem, evaluate, x, floor, max_iterations=max_iterations, on_step=on_step)
+    return levenberg_marquardt(problem, evaluate, x, floor, tolerance, max_iterations, on_step)

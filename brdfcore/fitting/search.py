@@ -30,6 +30,8 @@ _STARTS = 4  # best points of the scan, which run as one batch; of one shape hal
 _MANY_STARTS = 16  # the same of two lobes and more, whose optima are many
 _DESCENTS = 2  # starts of Adam and LBFGS, which run one after the other
 _POLISH = 300  # their steps on all the data, after the subset
+_NONLINEAR = 6  # starts of a lone lobe under a loss that is not linear in f, whose steps move every reflectance
+_RACE_ALL = 1e-6  # of the loss, the same as the next where reflectances move too
 _RACE = 1e-4  # of the loss: what another step would gain once a start's end is clear
 
 Say = Callable[[str, float, float], None]
@@ -135,9 +137,10 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
             outcome = least_squares(coarse, raced.x, which, on_step=tell) if projection.may_leave_the_box else raced
         else:
             x = torch.cat([starts, raced.x.reshape(starts.shape)], dim=1).reshape(-1, whole.size)
-            which = torch.arange(materials).repeat_interleave(2 * each)
+            kept = _MANY_STARTS if several_lobes(projection) else _NONLINEAR
+            x, which = _lowest(coarse, x, min(kept, 2 * each))
     if not (projected and linear):
-        outcome = least_squares(coarse, x, which, on_step=tell)
+        outcome = least_squares(coarse, x, which, _RACE_ALL, on_step=tell)
         iterations += outcome.iterations
     best = outcome.pick(_best(outcome.loss, materials))
     name = "variable_projection" if projected and linear else "least_squares"
@@ -153,6 +156,15 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     iterations += best.iterations
     seen = {id(p): p.evaluations for p in (whole, coarse, projection.problem)}
     return Found(whole, best, each, sum(seen.values()), iterations, name)
+
+
+def _lowest(problem: Problem, x: Tensor, count: int) -> tuple[Tensor, Tensor]:
+    """The rows x (M R, D) whose own loss is lowest, so many a material, and the material of each."""
+    which = torch.arange(problem.materials).repeat_interleave(len(x) // problem.materials)
+    loss = problem.loss(x, which)
+    order = torch.where(loss.isfinite(), loss, torch.inf).reshape(problem.materials, -1).argsort(dim=1)[:, :count]
+    chosen = order + order.new_tensor(range(problem.materials)).unsqueeze(-1) * (len(x) // problem.materials)
+    return x[chosen.reshape(-1)], torch.arange(problem.materials).repeat_interleave(count)
 
 
 def _best(loss: Tensor, materials: int) -> Tensor:
