@@ -1,8 +1,11 @@
 """Fits of materials to measured samples."""
 
-from ._fit import Progress, errors, fit
+from ._fit import Progress, fit
+from .batch import fit_batch
 from .losses import LOSSES
 from .plan import OPTIMIZERS, check
 from .result import Cost, Fit
+from .robust import ROBUST
+from .worth import errors
 
-__all__ = ["LOSSES", "OPTIMIZERS", "Cost", "Fit", "Progress", "check", "errors", "fit"]
+__all__ = ["LOSSES", "OPTIMIZERS", "ROBUST", "Cost", "Fit", "Progress", "check", "errors", "fit", "fit_batch"]

@@ -5,16 +5,14 @@
 so that one step size serves every material.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from .least_squares import DECREMENT, Outcome, decrement
-from .problem import Problem
+from .levenberg_marquardt import DECREMENT, Outcome, decrement
+from .problem import Gram, Problem
 
-OnStep = Callable[[int, float], None]
 _NEARLY = 1e-8  # of the loss: a gradient method that comes this near has converged (6 digits of the optimum)
 
 
@@ -23,18 +21,19 @@ class Scaled:
     """One start in scaled variables."""
 
     problem: Problem
+    which: Tensor | None
     x0: Tensor  # (D,)
     scale: Tensor  # (D,)
     unit: float
 
     @classmethod
-    def at(cls, problem: Problem, x: Tensor) -> "Scaled":
+    def at(cls, problem: Problem, x: Tensor, which: Tensor | None) -> "Scaled":
         """The scaling that the curvature at x (D,) asks for."""
-        gram = problem.gram(x.unsqueeze(0))
+        gram = problem.gram(x.unsqueeze(0), which)
         diagonal = gram.matrix[0].diagonal()
-        unit = float((problem.data.root_weight * problem.data.c * problem.data.y).square().sum()) or 1.0
+        unit = float(problem.squares()[0 if which is None else int(which)]) or 1.0
         typical = diagonal.max().clamp(min=1e-300)
-        return cls(problem, x, (unit / diagonal.clamp(min=1e-8 * typical)).sqrt(), unit)
+        return cls(problem, which, x, (unit / diagonal.clamp(min=1e-8 * typical)).sqrt(), unit)
 
     def x(self, z: Tensor) -> Tensor:
         """The raw values of z, put into the box."""
@@ -44,23 +43,24 @@ class Scaled:
         """The scaled variables of raw values."""
         return (x - self.x0) / self.scale
 
+    def gram(self, z: Tensor) -> Gram:
+        """The normal equations at z, in raw values."""
+        return self.problem.gram(self.x(z.detach()).unsqueeze(0), self.which)
+
     def loss_and_gradient(self, z: Tensor) -> tuple[float, Tensor]:
         """The loss over the data's own square, and its gradient in z without the values held on an end."""
-        problem = self.problem
-        x = self.x(z.detach()).requires_grad_()
-        problem.evaluations += 1
-        total = 0.0
-        gradient = torch.zeros_like(x)
-        for data in problem.chunks(6 * problem.data.y.shape[1]):
-            loss = problem.residuals(x, data).square().sum()
-            gradient += torch.autograd.grad(loss, x)[0]
-            total += float(loss.detach())
-        held = problem.held(x.detach(), gradient)
-        return total / self.unit, torch.where(held, 0.0, gradient * self.scale / self.unit)
+        x, gram = self.x(z.detach()), self.gram(z)
+        held = self.problem.held(x, gram.gradient[0])
+        return float(gram.loss[0]) / self.unit, torch.where(held, 0.0, 2 * gram.gradient[0] * self.scale / self.unit)
+
+    def near(self, z: Tensor) -> bool:
+        """Whether the Gauss-Newton decrement shows that little is left to gain."""
+        gram = self.gram(z)
+        held = self.problem.held(self.x(z.detach()).unsqueeze(0), gram.gradient)
+        return bool(decrement(gram, held) <= max(_NEARLY, DECREMENT) * gram.loss)
 
     def outcome(self, z: Tensor, iterations: int) -> Outcome:
-        """Where z ended, with the convergence that the Gauss-Newton decrement there shows."""
+        """Where z ended, with the convergence that the decrement there shows."""
         x = self.x(z.detach()).unsqueeze(0)
-        gram = self.problem.gram(x)
-        near = decrement(self.problem, x, gram) <= max(_NEARLY, DECREMENT) * gram.loss
-        return Outcome(x, gram.loss, near, iterations)
+        near = torch.tensor([self.near(z)])
+        return Outcome(x, self.problem.loss(x, self.which), near, iterations)

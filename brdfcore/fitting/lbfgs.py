@@ -3,17 +3,23 @@
 import torch
 from torch import Tensor
 
-from .descent import OnStep, Scaled
-from .least_squares import Outcome
+from .descent import Scaled
+from .levenberg_marquardt import OnStep, Outcome
 from .problem import Problem
 
 _ROUND = 40  # iterations between two looks at the box
 _GAIN = 1e-13  # of the loss: a round that gains less has ended
 
 
-def lbfgs(problem: Problem, x: Tensor, max_iterations: int = 2000, on_step: OnStep | None = None) -> Outcome:
-    """The point that one start x (1, D) leads to."""
-    scaled = Scaled.at(problem, x[0])
+def lbfgs(
+    problem: Problem,
+    x: Tensor,
+    which: Tensor | None = None,
+    max_iterations: int = 2000,
+    on_step: OnStep | None = None,
+) -> Outcome:
+    """The point that one start x (1, D) leads to; `which` (1,) names its material."""
+    scaled = Scaled.at(problem, x[0], which)
     z = torch.nn.Parameter(torch.zeros_like(x[0]))
 
     def closure() -> Tensor:
@@ -21,6 +27,8 @@ def lbfgs(problem: Problem, x: Tensor, max_iterations: int = 2000, on_step: OnSt
         return torch.tensor(loss, dtype=torch.float64)
 
     best = float(closure())
+    if on_step is not None:
+        on_step(0, best * scaled.unit)
     done = 0
     stale = 0
     while done < max_iterations and stale < 2:

@@ -11,7 +11,7 @@ channels. All are sums of squares. root(x) = (x + e)^(1/3) - e^(1/3) with e = 1 
 bounds the root's slope at zero. A negative y counts as 0 in log, in cube_root and in the denominator of relative.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -20,10 +20,10 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class Scales:
-    """Magnitudes of the data that some losses need [1/sr]."""
+    """Magnitudes of the data that some losses need [1/sr], one number or one a material."""
 
-    y: float  # median positive value
-    cy: float  # median positive value times the cosine
+    y: float | Tensor  # median positive value
+    cy: float | Tensor  # median positive value times the cosine
 
     @classmethod
     def of(cls, y: Tensor, c: Tensor) -> "Scales":
@@ -35,8 +35,19 @@ class Scales:
 
         return cls(median(y), median(c * y))
 
+    @classmethod
+    def stacked(cls, scales: Sequence["Scales"]) -> "Scales":
+        """The scales of several materials, each (M, 1, 1)."""
+        y, cy = torch.tensor([[s.y, s.cy] for s in scales], dtype=torch.float64).T.reshape(2, -1, 1, 1)
+        return cls(y, cy)
+
+    def rows(self, index: Tensor) -> "Scales":
+        """The scales of the materials that the index names."""
+        return Scales(*(s[index] if isinstance(s, Tensor) else s for s in (self.y, self.cy)))
+
 
 Difference = Callable[[Tensor, Tensor, Tensor, Scales], Tensor]
+Factor = Callable[[Tensor, Tensor, Scales], Tensor]
 
 
 @dataclass(frozen=True)
@@ -45,13 +56,22 @@ class Loss:
 
     name: str
     difference: Difference
+    factor: Factor | None = None  # of f - y, where the difference is linear in f
     uses_cells: bool = False
     is_mean: bool = False  # reported as the root of the weighted mean, else as the sum
     statistical: bool = False  # with a known sigma, weighing by the inverse variance makes it chi-square
 
 
-def _cosine(f: Tensor, y: Tensor, c: Tensor, scales: Scales) -> Tensor:
-    return c * (f - y)
+def _linear(factor: Factor) -> Difference:
+    return lambda f, y, c, scales: factor(y, c, scales) * (f - y)
+
+
+def _cosine(y: Tensor, c: Tensor, scales: Scales) -> Tensor:
+    return c
+
+
+def _relative(y: Tensor, c: Tensor, scales: Scales) -> Tensor:
+    return 1 / (y.clamp(min=0) + 0.01 * scales.y)
 
 
 def _log(f: Tensor, y: Tensor, c: Tensor, scales: Scales) -> Tensor:
@@ -63,17 +83,13 @@ def _cube_root(f: Tensor, y: Tensor, c: Tensor, scales: Scales) -> Tensor:
     return (c * f + e) ** (1 / 3) - (c * y.clamp(min=0) + e) ** (1 / 3)
 
 
-def _relative(f: Tensor, y: Tensor, c: Tensor, scales: Scales) -> Tensor:
-    return (f - y) / (y.clamp(min=0) + 0.01 * scales.y)
-
-
 LOSSES: dict[str, Loss] = {
     loss.name: loss
     for loss in (
-        Loss("cosine", _cosine, statistical=True),
-        Loss("l2", _cosine, uses_cells=True, is_mean=True, statistical=True),
+        Loss("cosine", _linear(_cosine), _cosine, statistical=True),
+        Loss("l2", _linear(_cosine), _cosine, uses_cells=True, is_mean=True, statistical=True),
         Loss("log", _log),
         Loss("cube_root", _cube_root),
-        Loss("relative", _relative),
+        Loss("relative", _linear(_relative), _relative),
     )
 }

@@ -1,7 +1,8 @@
 """What a fit is asked: the text's form with its open options decided, and which values are free, fixed or gray."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import torch
 from torch import Tensor
@@ -9,6 +10,8 @@ from torch import Tensor
 from ..errors import ModelTextError, ParameterError, unknown_name
 from ..models.form import Form, build
 from ..models.text import ParsedTerm, Tie, parse
+from ..parameters import Parameter
+from .limits import check_max_theta, check_robust, checked_bounds
 from .losses import LOSSES
 
 OPTIMIZERS = ("auto", "least_squares", "lbfgs", "adam")
@@ -24,11 +27,29 @@ class Plan:
     gray: frozenset[str]
     per_channel: frozenset[str]
     choices: tuple[str, ...]
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # narrower boxes of the user's
+    starts: tuple[dict[str, Tensor], ...] = ()  # the user's: the text's where it has values, and more
+    robust: str | None = None
+    robust_scale: float | None = None
+    max_theta: float | None = None  # [rad]
 
     @property
     def free(self) -> tuple[str, ...]:
         """The keys that the fit determines, in the order of the text."""
         return tuple(key for key in self.form.parameters if key not in self.fixed)
+
+    def limits(self, key: str) -> tuple[Tensor, Tensor]:
+        """The smallest and largest values of a free key, shaped as its start: its box, its ties', and the user's."""
+        low, high = self.form.bounds(key, self.start[key])
+        least, most = self.bounds.get(key, (-math.inf, math.inf))
+        return low.clamp(min=least), high.clamp(max=most)
+
+    def search_range(self, key: str) -> tuple[float, float]:
+        """The range from which a key's starts are drawn: the parameter's, within the user's bounds."""
+        low, high = self.form.parameters[key].search_range
+        least, most = self.bounds.get(key, (low, high))
+        inside = max(low, least), min(high, most)
+        return inside if inside[0] < inside[1] else (least, most)
 
 
 def plan(
@@ -39,6 +60,8 @@ def plan(
     fixed: Mapping[str, float | Sequence[float]] | None = None,
     gray: Iterable[str] = (),
     per_channel: Iterable[str] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    starts: Iterable[Mapping[str, float | Sequence[float]]] = (),
 ) -> Plan:
     """The plan for data of so many channels; raises ModelTextError, ParameterError or UnknownNameError.
 
@@ -57,49 +80,68 @@ def plan(
     if azimuth_observed:
         choices += tuple(_held_isotropic(form, parsed))
     fixed = dict(fixed or {})
-    for field, keys in (("gray", gray), ("per_channel", per_channel)):
+    for name, keys in (("gray", gray), ("per_channel", per_channel)):
         if isinstance(keys, str):
             raise ParameterError(
-                f"Expected {field} to be a list of keys, got the text {keys!r}. Write [{keys!r}].", field=field
+                f"Expected {name} to be a list of keys, got the text {keys!r}. Write [{keys!r}].", field=name
             )
     gray, per_channel = frozenset(gray), frozenset(per_channel)
-    for field, known in (("fixed", fixed), ("gray", gray), ("per_channel", per_channel)):
+    for name, known in (("fixed", fixed), ("gray", gray), ("per_channel", per_channel)):
         for key in known:
             if key not in form.parameters:
-                raise unknown_name(f"a key of {field}", key, form.parameters, field=field)
+                raise unknown_name(f"a key of {name}", key, form.parameters, field=name)
     if both := sorted(gray & per_channel):
         raise ParameterError(
             f"Expected {both[0]} in gray or in per_channel, got it in both. Keep one.", field="per_channel"
         )
-    start = {}
-    for key, parameter in form.parameters.items():
-        value = _tensor(key, fixed.get(key, given.get(key, parameter.default)))
-        parameter.check(key, value)
-        wide = parameter.per_channel == "yes" or key in per_channel or value.ndim == 1
-        if key in per_channel and parameter.per_channel == "no":
-            raise ParameterError(
-                f"Expected per_channel to name reflectances, got {key}. It has one value for all channels; drop it.",
-                field="per_channel",
-            )
-        if value.ndim == 1 and value.numel() != channels:
-            raise ParameterError(
-                f"Expected {key} to have {channels} channels as the data has, got {value.numel()}. "
-                "Give one number, or one a channel.",
-                field=key,
-            )
-        if key in gray or not wide:
-            if value.ndim == 1:
-                raise ParameterError(
-                    f"Expected {key} to be one number, since gray names it, got {value.numel()}. Give one.", field=key
-                )
-            start[key] = value
-        elif channels == 1:
-            start[key] = value.reshape(())
-        else:
-            start[key] = value.expand(channels).clone()
+    start = {
+        key: _start(key, parameter, fixed.get(key, given.get(key, parameter.default)), channels, gray, per_channel)
+        for key, parameter in form.parameters.items()
+    }
     for key, tie in form.ties.items():
         _check_tie(form, key, tie, channels, start, fixed)
-    return Plan(form, start, frozenset(fixed), gray, per_channel, choices)
+    narrowed = checked_bounds(form, bounds, start, {*given, *fixed})
+    further = [start] if set(given) - set(fixed) else []
+    for values in starts:
+        if not isinstance(values, Mapping):
+            raise ParameterError(
+                f"Expected starts to be a list of mappings of keys to values, got {type(values).__name__} in it. "
+                "Pass [{key: value, ...}, ...].",
+                field="starts",
+            )
+        for key in values:
+            if key not in form.parameters:
+                raise unknown_name("a key of starts", str(key), form.parameters, field="starts")
+        own = {key: _start(key, form.parameters[key], v, channels, gray, per_channel) for key, v in values.items()}
+        further.append({**start, **own})
+    return Plan(form, start, frozenset(fixed), gray, per_channel, choices, narrowed, tuple(further))
+
+
+def _start(
+    key: str, parameter: Parameter, number: object, channels: int, gray: frozenset[str], per_channel: frozenset[str]
+) -> Tensor:
+    """The value as a start, () or (C,); raises where it leaves the box or has a wrong number of channels."""
+    value = _tensor(key, number)
+    parameter.check(key, value)
+    wide = parameter.per_channel == "yes" or key in per_channel or value.ndim == 1
+    if key in per_channel and parameter.per_channel == "no":
+        raise ParameterError(
+            f"Expected per_channel to name reflectances, got {key}. It has one value for all channels; drop it.",
+            field="per_channel",
+        )
+    if value.ndim == 1 and value.numel() != channels:
+        raise ParameterError(
+            f"Expected {key} to have {channels} channels as the data has, got {value.numel()}. "
+            "Give one number, or one a channel.",
+            field=key,
+        )
+    if key in gray or not wide:
+        if value.ndim == 1:
+            raise ParameterError(
+                f"Expected {key} to be one number, since gray names it, got {value.numel()}. Give one.", field=key
+            )
+        return value
+    return value.reshape(()) if channels == 1 else value.expand(channels).clone()
 
 
 def _held_isotropic(form: Form, parsed: Sequence[ParsedTerm]) -> Iterator[str]:
@@ -160,6 +202,11 @@ def check(
     seed: int = 0,
     *,
     azimuth_observed: bool = False,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    starts: Iterable[Mapping[str, float | Sequence[float]]] = (),
+    robust: str | None = None,
+    robust_scale: float | None = None,
+    max_theta: float | None = None,
 ) -> Plan:
     """The plan of these arguments of `fit` for data of so many channels; raises what `fit` would raise."""
     if not isinstance(model, str):
@@ -174,4 +221,16 @@ def check(
         raise ParameterError(
             f"Expected seed to be a whole number from 0 to 2^63 - 1, got {seed!r}. Choose another.", field="seed"
         )
-    return plan(channels, model, azimuth_observed=azimuth_observed, fixed=fixed, gray=gray, per_channel=per_channel)
+    check_robust(robust, robust_scale)
+    check_max_theta(max_theta)
+    made = plan(
+        channels,
+        model,
+        azimuth_observed=azimuth_observed,
+        fixed=fixed,
+        gray=gray,
+        per_channel=per_channel,
+        bounds=bounds,
+        starts=starts,
+    )
+    return replace(made, robust=robust, robust_scale=robust_scale, max_theta=max_theta)

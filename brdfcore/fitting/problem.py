@@ -1,47 +1,27 @@
-"""A fit as numbers: residuals of a vector of raw values, and their exact derivatives.
+"""A fit as numbers: residuals of vectors of raw values, and their exact normal equations.
 
-A value a channel reaches only its own channel's residuals, so the Jacobian is kept as one column a parameter name,
-(N, C, P), and the normal equations are summed from it into the (D, D) matrix: 31 channels cost what one name costs.
-All is float64, summed in chunks, and batched over starts.
+A value a channel reaches only its own channel's residuals, so a derivative is one column a parameter name, and the
+normal equations are summed from those into the (D, D) matrix: 31 channels cost what one name costs. All is float64,
+summed in chunks, and batched over rows: starts, and materials that share their directions.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
-from torch.func import jvp, vmap
 
 from ..formats.samples import Samples
-from ..geometry import Geometry, geometry
-from ..models.form import Form
 from ..parameters import Values
+from .columns import Columns, Mix
+from .data import Data
 from .losses import Loss, Scales
 from .plan import Plan
-
-_CHUNK = 4_000_000  # numbers in the largest intermediate: 32 MB
-
-
-@dataclass(frozen=True)
-class Data:
-    """What a chunk of residuals is computed from."""
-
-    g: Geometry
-    c: Tensor  # (N, 1) cos theta_i
-    y: Tensor  # (N, C)
-    root_weight: Tensor  # (N, 1) or (N, C), square roots of the weights
-    sigma: Tensor | None  # (N, C)
-
-    def slice(self, begin: int, end: int) -> "Data":
-        """The samples from begin to end."""
-        geometry_ = Geometry(*(None if q is None else q[begin:end] for q in self.g))
-        sigma = None if self.sigma is None else self.sigma[begin:end]
-        return Data(geometry_, self.c[begin:end], self.y[begin:end], self.root_weight[begin:end], sigma)
+from .robust import ROBUST, softened
 
 
 class Gram(NamedTuple):
-    """The normal equations of S starts."""
+    """The normal equations of S rows."""
 
     loss: Tensor  # (S,)
     gradient: Tensor  # (S, D), of half the loss
@@ -49,47 +29,63 @@ class Gram(NamedTuple):
 
 
 class Problem:
-    """The residuals of a plan over samples under a loss, as a function of the raw free values x (D,)."""
+    """The residuals of a plan over samples under a loss, as functions of rows of raw free values x (S, D).
 
-    def __init__(self, plan: Plan, samples: Samples, loss: Loss, scales: Scales | None = None) -> None:
+    `which` (S,) names the material of each row; without it all rows belong to the only one. A robust plan needs the
+    scale (M,) of its residuals.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        samples: Samples | Sequence[Samples],
+        loss: Loss,
+        scales: Scales | None = None,
+        robust_scale: Tensor | None = None,
+        data: Data | None = None,
+    ) -> None:
         self.plan = plan
         self.loss_kind = loss
-        g = geometry(samples.wi, samples.wo, plan.form.needs)
-        c = samples.wi[:, 2:]
-        self.data = Data(g, c, samples.values, root_weights(samples, loss), samples.sigma)
-        self.scales = scales or Scales.of(samples.values, c)
+        self.robust_scale = robust_scale
+        several = [samples] if isinstance(samples, Samples) else list(samples)
+        self.data = data or Data.of(several, plan.form.needs, loss, scales)
+        self.channels = self.data.y.shape[1]
         self.keys = plan.free
         sizes = [plan.start[key].numel() for key in self.keys]
         begins = [sum(sizes[:i]) for i in range(len(sizes))]
         self.slices = {key: slice(b, b + n) for key, b, n in zip(self.keys, begins, sizes, strict=True)}
         self.size = sum(sizes)
-        channels = samples.values.shape[1]
-        self.index = (
-            torch.stack(  # (C, P): where the value of a name for a channel stands in x
-                [torch.arange(b, b + n).expand(channels) for b, n in zip(begins, sizes, strict=True)], dim=-1
-            )
-            if self.keys
-            else torch.zeros(channels, 0, dtype=torch.long)
-        )
-        self.tangents = torch.zeros(len(sizes), self.size, dtype=torch.float64)
-        for row, (b, n) in enumerate(zip(begins, sizes, strict=True)):
-            self.tangents[row, b : b + n] = 1
-        self.low, self.high = self._raw_bounds(plan.form)
+        self.index = torch.zeros(self.channels, len(sizes), dtype=torch.long)  # (C, P): where a name's value is in x
+        for p, (b, n) in enumerate(zip(begins, sizes, strict=True)):
+            self.index[:, p] = torch.arange(b, b + n)
+        self.logarithmic = torch.tensor([plan.form.parameters[key].scale == "log" for key in self.keys])
+        self.low, self.high = self._raw_bounds()
+        self.columns = Columns(plan.form, plan.start, self.keys, self.data.slice(0, 2).g)
         self.evaluations = 0
 
-    @property
-    def residual_count(self) -> int:
-        """How many residuals there are, N C."""
-        return self.data.y.numel()
-
-    def _raw_bounds(self, form: Form) -> tuple[Tensor, Tensor]:
-        ends: list[list[Tensor]] = [[], []]
+    def _raw_bounds(self) -> tuple[Tensor, Tensor]:
+        sides: list[list[Tensor]] = [[], []]
         for key in self.keys:
-            parameter = form.parameters[key]
-            for side, natural in zip(ends, form.bounds(key, self.plan.start[key]), strict=True):
+            parameter = self.plan.form.parameters[key]
+            for side, natural in zip(sides, self.plan.limits(key), strict=True):
                 side.append(parameter.to_raw(natural).reshape(-1))
         empty = torch.zeros(0, dtype=torch.float64)
-        return (torch.cat(ends[0]), torch.cat(ends[1])) if self.keys else (empty, empty)
+        low, high = (torch.cat([empty, *side]) for side in sides)
+        return low, high
+
+    @property
+    def materials(self) -> int:
+        """How many materials the data are of, M."""
+        return len(self.data.y)
+
+    @property
+    def linear(self) -> bool:
+        """Whether the residuals are linear in f."""
+        return self.plan.robust is None and self.loss_kind.factor is not None
+
+    def squares(self) -> Tensor:
+        """The sum of squares of the weighted c y, (M,): the unit in which losses of any data are of order one."""
+        return (self.data.root_weight * self.data.c * self.data.y).square().sum((1, 2))
 
     def pack(self, values: Values) -> Tensor:
         """The raw vector (D,) of the free values, put into the bounds."""
@@ -106,52 +102,90 @@ class Problem:
             values[key] = self.plan.form.parameters[key].from_raw(raw)
         return values
 
+    def natural(self, x: Tensor) -> dict[str, Tensor]:
+        """All natural values of rows x (S, D), each (S, 1, 1) or (S, 1, C), the fixed ones () or (C,)."""
+        values = {key: self.plan.start[key] for key in self.plan.fixed}
+        for key, at in self.slices.items():
+            values[key] = self.plan.form.parameters[key].from_raw(x[:, at].unsqueeze(1))
+        return values
+
+    def chain(self, x: Tensor) -> Tensor:
+        """The derivatives of the natural values by the raw ones, (S, C, P)."""
+        raw = x[:, self.index]
+        return torch.where(self.logarithmic, torch.exp(torch.where(self.logarithmic, raw, 0.0)), 1.0)
+
+    def mix(self, x: Tensor) -> Mix:
+        """How the columns make value and derivatives at x (S, D)."""
+        natural, shape = self.natural(x), (len(x), 1, self.channels)
+        coefficients = self.columns.coefficients(natural, shape).squeeze(1)
+        slopes = self.columns.coefficient_slopes(natural, shape).squeeze(1)
+        return self.columns.mix(coefficients, slopes, self.chain(x))
+
     def f(self, x: Tensor, data: Data) -> Tensor:
-        """The model's BRDF [1/sr], (N, C)."""
-        return self.plan.form.f(self.unpack(x), data.g).expand_as(data.y)
+        """The model's BRDF [1/sr], (S, C, N)."""
+        natural = self.natural(x)
+        columns = self.columns.values(natural, data.g, len(x), self.channels)
+        return _mixed(self.columns.coefficients(natural, (len(x), 1, self.channels)).squeeze(1), columns)
 
-    def residuals(self, x: Tensor, data: Data) -> Tensor:
-        """The weighted residuals (N, C) whose squares add up to the loss."""
-        return data.root_weight * self.loss_kind.difference(self.f(x, data), data.y, data.c, self.scales)
+    def residuals(self, f: Tensor, data: Data, which: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
+        """For f (S, C, N): what adds up to the loss, residuals as Gauss-Newton sees them, and their slopes by f."""
+        if self.loss_kind.factor is not None:
+            slope = (data.root_weight * self.loss_kind.factor(data.y, data.c, data.scales)).expand_as(f)
+            r = slope * (f - data.y)
+        else:
+            with torch.enable_grad():
+                leaf = f.detach().requires_grad_()
+                r = data.root_weight * self.loss_kind.difference(leaf, data.y, data.c, data.scales)
+                (slope,) = torch.autograd.grad(r.sum(), leaf)
+            r = r.detach()
+        if self.plan.robust is None or self.robust_scale is None:
+            return r.square(), r, slope
+        scale = self.robust_scale if which is None else self.robust_scale[which]
+        rho, r, root = softened(ROBUST[self.plan.robust], scale.reshape(-1, 1, 1), r)
+        return rho, r, slope * root
 
-    def chunks(self, numbers_a_sample: int) -> Iterator[Data]:
-        """The data in pieces that keep intermediates of so many numbers a sample small."""
-        count = self.data.y.shape[0]
-        step = max(1, _CHUNK // max(1, numbers_a_sample))
-        for begin in range(0, count, step):
-            yield self.data.slice(begin, min(begin + step, count)) if step < count else self.data
-
-    def loss(self, x: Tensor) -> Tensor:
-        """The sum of squares for each of S raw vectors, (S, D) -> (S,)."""
+    def loss(self, x: Tensor, which: Tensor | None = None) -> Tensor:
+        """The sum of squares, or of what a robust form makes of them, of each row, (S,)."""
         self.evaluations += len(x)
         total = torch.zeros(len(x), dtype=torch.float64)
-        for data in self.chunks(3 * len(x) * self.data.y.shape[1]):
-            total = total + vmap(lambda row, d=data: self.residuals(row, d).square().sum())(x)
+        for piece in self.data.chunks(len(x)):
+            data = piece if which is None else piece.rows(which)
+            total += self.residuals(self.f(x, data), data, which)[0].sum((1, 2))
         return total
 
-    def jacobian(self, x: Tensor, data: Data) -> tuple[Tensor, Tensor]:
-        """Residuals (N, C) of one raw vector and their derivatives (N, C, P), one column a parameter name."""
+    def jacobian(self, x: Tensor, data: Data, which: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor]:
+        """Residuals (S, C, N), their derivatives (S, C, P, N), one column a parameter name, and their slopes by f."""
+        columns = self.columns.all(self.natural(x), data.g, len(x), self.channels)
+        mix = self.mix(x)
+        _, r, slope = self.residuals(_mixed(mix.value, columns), data, which)
+        return r, slope.unsqueeze(2) * (mix.slopes.transpose(2, 3) @ columns), slope
 
-        def along(tangent: Tensor) -> tuple[Tensor, Tensor]:
-            value, slope = jvp(lambda v: self.residuals(v, data), (x,), (tangent,))[:2]
-            return value, slope
-
-        residuals, columns = vmap(along, out_dims=(0, -1))(self.tangents)
-        return residuals[0], columns
-
-    def gram(self, x: Tensor) -> Gram:
-        """The normal equations at each of S raw vectors (S, D)."""
+    def gram(self, x: Tensor, which: Tensor | None = None) -> Gram:
+        """The normal equations at each row."""
         self.evaluations += len(x)
-        starts, channels, names = len(x), self.data.y.shape[1], len(self.keys)
+        mix = self.mix(x)
+        starts, channels, names = len(x), self.channels, len(self.keys)
         loss = torch.zeros(starts, dtype=torch.float64)
         gradient = torch.zeros(starts, channels, names, dtype=torch.float64)
         matrix = torch.zeros(starts, channels, names, names, dtype=torch.float64)
-        for data in self.chunks(starts * channels * (names + 3)):
-            residuals, columns = vmap(lambda row, d=data: self.jacobian(row, d))(x)
-            by_channel = columns.permute(0, 2, 3, 1)  # (S, C, P, N)
-            loss += residuals.square().sum((1, 2))
-            gradient += (by_channel @ residuals.permute(0, 2, 1).unsqueeze(-1)).squeeze(-1)
-            matrix += by_channel @ by_channel.transpose(-1, -2)
+        natural = self.natural(x)
+        for piece in self.data.chunks(len(x)):
+            data = piece if which is None else piece.rows(which)
+            columns = self.columns.all(natural, data.g, starts, channels)
+            rho, r, slope = self.residuals(_mixed(mix.value, columns), data, which)
+            loss += rho.sum((1, 2))
+            if self.linear and columns.shape[1] == 1:
+                factor = linear_factor(self.loss_kind, data)
+                if factor.shape[1] == 1:  # one product of columns serves all channels
+                    weighed = columns * factor.unsqueeze(2)
+                    products = mix.slopes.transpose(2, 3) @ (weighed @ weighed.transpose(2, 3))
+                    matrix += products @ mix.slopes
+                    right = weighed[:, 0] @ r.transpose(1, 2)  # (S, Q, C)
+                    gradient += (mix.slopes.transpose(2, 3) @ right.transpose(1, 2).unsqueeze(-1)).squeeze(-1)
+                    continue
+            rows = slope.unsqueeze(2) * (mix.slopes.transpose(2, 3) @ columns)  # (S, C, P, N)
+            gradient += (rows @ r.unsqueeze(-1)).squeeze(-1)
+            matrix += rows @ rows.transpose(2, 3)
         return Gram(loss, self.scatter_vector(gradient), self.scatter_matrix(matrix))
 
     def scatter_vector(self, by_channel: Tensor) -> Tensor:
@@ -172,19 +206,15 @@ class Problem:
         return ((x <= self.low) & (gradient > 0)) | ((x >= self.high) & (gradient < 0))
 
 
-def weights(samples: Samples, loss: Loss) -> Tensor:
-    """The weights w of the loss's definition, (N, 1): the data's, else 1, times a grid cell's measure."""
-    own = samples.weight if samples.weight is not None else torch.ones(len(samples), dtype=torch.float64)
-    if loss.uses_cells and samples.cell is not None:
-        own = own * samples.cell
-    return own.unsqueeze(-1)
+def linear_factor(loss: Loss, data: Data) -> Tensor:
+    """What multiplies f - y in the residuals of a loss that is linear in f, (M, C, N) or broadcasting to it."""
+    if loss.factor is None:
+        raise TypeError(f"the residuals of {loss.name} are not linear in f")
+    return data.root_weight * loss.factor(data.y, data.c, data.scales)
 
 
-def root_weights(samples: Samples, loss: Loss) -> Tensor:
-    """Square roots of the weights that a fit uses, (N, 1) or (N, C).
-
-    With a known sigma and no weight, a statistical loss weighs by the inverse variance of c y: that is chi-square.
-    """
-    if loss.statistical and samples.sigma is not None and samples.weight is None:
-        return 1 / (samples.wi[:, 2:] * samples.sigma)
-    return weights(samples, loss).sqrt()
+def _mixed(coefficients: Tensor, columns: Tensor) -> Tensor:
+    """Columns (S, W, Q, N) mixed by coefficients (S, C, Q), of the first columns where those are fewer: (S, C, N)."""
+    if columns.shape[1] == 1:
+        return coefficients @ columns[:, 0, : coefficients.shape[-1]]
+    return (coefficients.unsqueeze(2) @ columns[:, :, : coefficients.shape[-1]]).squeeze(2)

@@ -2,10 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from torch import Tensor
 
+from ..formats.samples import Samples
+from ..models.form import Form
 from ..models.material import Material
 
 
@@ -24,13 +27,16 @@ class Cost:
 class Fit:
     """What `bc.fit` returns.
 
+    form, values, samples: what was fitted, the best values, stored parameters only, and to what.
     parameters, standard_errors: key -> () or (C,); intervals: key -> (2,) or (C, 2), 95 %. NaN stands where there is no
     number to give: in an interval for a value that was fixed or lies on an end of its box, and everywhere for one
     that the data leave undetermined. `objective` is the loss that was minimised: chi-square where the samples' sigma
     weighed it, else the error of that name. `status` is "converged" or "stopped_early", `message` says more.
     """
 
-    material: Material
+    form: Form
+    values: dict[str, Tensor]
+    samples: Samples
     parameters: dict[str, Tensor]
     standard_errors: dict[str, Tensor]
     intervals: dict[str, Tensor]
@@ -47,17 +53,21 @@ class Fit:
     chi_square: tuple[float, int] | None  # with its degrees of freedom, where the samples' sigma is known
     cost: Cost
     channels: tuple[str, ...]
-    samples_report: dict[str, Any]
     provenance: dict[str, str | int]
+
+    @cached_property
+    def material(self) -> Material:
+        """The fitted material."""
+        return Material(self.form, self.values)
 
     @property
     def model(self) -> str:
         """The model that was fitted, its options decided, without values."""
-        return self.material.form.text()
+        return self.form.text()
 
     def units(self) -> dict[str, str]:
         """What each parameter is, with its unit."""
-        return {key: parameter.description for key, parameter in self.material.form.all_parameters.items()}
+        return {key: parameter.description for key, parameter in self.form.all_parameters.items()}
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON-able data, null where there is no number."""
@@ -82,7 +92,7 @@ class Fit:
             "chi_square": None if self.chi_square is None else list(self.chi_square),
             "cost": vars(self.cost).copy(),
             "channels": list(self.channels),
-            "data": self.samples_report,
+            "data": self.samples.report(),
             "provenance": dict(self.provenance),
         }
         return {**result, "report": _report(result)}

@@ -15,94 +15,104 @@ the others and has no interval; a combination of values that the data leave free
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
-from torch.func import jvp
 
-from .problem import Data, Problem
+from .problem import Gram, Problem
 
 NORMAL_QUANTILE = 1.959963984540054  # leaves 2.5 % above it
 _PRESSED = 1e-7  # cosine between residuals and a column of J below which nothing presses a value against its end
 _RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding: J's own digits, squared
+_SILENT = 1e-12  # of the data: a value whose raw unit moves the residuals by less is lost in their rounding
 _ALONE = 1e-9  # a sample with 1 - leverage below this determines a value alone, so its noise cannot be seen
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard errors and intervals by raw position; NaN where there are none."""
+    """Standard errors and intervals of M materials by raw position; NaN where there are none."""
 
-    standard_error: Tensor  # (D,), natural unit
-    low: Tensor  # (D,)
-    high: Tensor  # (D,)
-    undetermined: Tensor  # (D,) bool
-    held: Tensor  # (D,) bool
-    freedom: int  # residuals that weigh anything, less the values that are free
+    standard_error: Tensor  # (M, D), natural unit
+    low: Tensor  # (M, D)
+    high: Tensor  # (M, D)
+    undetermined: Tensor  # (M, D) bool
+    held: Tensor  # (M, D) bool
+    freedom: Tensor  # (M,) residuals that weigh anything, less the values that are free
+
+    def of_material(self, row: int) -> "Uncertainty":
+        """That of one material, without the axis M."""
+        return Uncertainty(*(getattr(self, name)[row] for name in self.__dataclass_fields__))
 
 
-def uncertainty(problem: Problem, x: Tensor) -> Uncertainty:
-    """The uncertainties of the optimum x (D,)."""
-    counted = int((problem.data.root_weight.expand_as(problem.data.y) > 0).sum())
+def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncertainty:
+    """The uncertainties of the optima x (M, D), one a material of the problem, whose normal equations may be known."""
+    which = torch.arange(len(x))
+    counted = (problem.data.root_weight.expand_as(problem.data.y) > 0).sum((1, 2))
+    known_noise = problem.data.sigma is not None and problem.plan.robust is None
     if problem.size == 0:
         return Uncertainty(x, x, x, x.bool(), x.bool(), counted)
-    gram = problem.gram(x.unsqueeze(0))
-    matrix = gram.matrix[0]
-    pressed = gram.gradient[0].abs() > _PRESSED * (matrix.diagonal() * gram.loss).sqrt()
-    held = problem.held(x.unsqueeze(0), gram.gradient)[0] & pressed
-    undetermined = _undetermined(matrix, held)
-    at = (~(held | undetermined)).nonzero().squeeze(-1)
-    error, factor = (torch.full_like(x, math.nan) for _ in range(2))
-    if at.numel() and (counted > at.numel() or problem.data.sigma is not None):
-        part = matrix[at][:, at]
-        scale = part.diagonal().rsqrt()
-        inverse = torch.zeros_like(matrix)  # scaled while it is inverted: widths and reflectances differ by 1e4
-        scaled = torch.linalg.inv(scale.unsqueeze(-1) * part * scale)
-        inverse[at.unsqueeze(-1), at] = scale.unsqueeze(-1) * scaled * scale
-        variance, freedom = _variances(problem, x, inverse)
-        error[at] = variance[at].sqrt()
-        factor[at] = NORMAL_QUANTILE if problem.data.sigma is not None else t_quantile(freedom[at])
-    return Uncertainty(*_natural(problem, x, error, factor), undetermined, held, counted - at.numel())
+    gram = gram or problem.gram(x, which)
+    matrix, diagonal = gram.matrix, gram.matrix.diagonal(dim1=-2, dim2=-1)
+    pressed = gram.gradient.abs() > _PRESSED * (diagonal * gram.loss.unsqueeze(-1)).sqrt()
+    held = problem.held(x, gram.gradient) & pressed
+    undetermined = _undetermined(matrix, held, _SILENT**2 * problem.squares())
+    free = ~(held | undetermined)
+    freedom = counted - free.sum(-1)
+    scaled, scale = _scaled(matrix, free)  # widths and reflectances differ by 1e4
+    inverse = torch.linalg.inv(scaled) * _outer(scale)
+    variance, alike = _variances(problem, x, which, inverse)
+    some = free & ((freedom > 0) | known_noise).unsqueeze(-1)
+    error = torch.where(some, variance.sqrt(), math.nan)
+    factor = torch.full_like(error, NORMAL_QUANTILE) if known_noise else t_quantile(alike)
+    return Uncertainty(*_natural(problem, x, error, factor), undetermined, held, freedom)
 
 
-def _variances(problem: Problem, x: Tensor, inverse: Tensor) -> tuple[Tensor, Tensor]:
-    """The variance of each raw value, and the degrees of freedom of its estimate, each (D,)."""
-    by_channel = inverse[problem.index]  # (C, P, D)
-    own = torch.stack([inverse[index][:, index] for index in problem.index])  # (C, P, P)
-    variance, even, even_squared = (torch.zeros(problem.size, dtype=torch.float64) for _ in range(3))
-    for data in problem.chunks(problem.data.y.shape[1] * (problem.size + 3 * len(problem.keys))):
-        residuals, columns = problem.jacobian(x, data)
-        influence = torch.einsum("ncp,cpd->ncd", columns, by_channel).square()
-        if data.sigma is not None:
-            spread = _known_variance(problem, x, data)
+def _outer(x: Tensor) -> Tensor:
+    return x.unsqueeze(-1) * x.unsqueeze(-2)
+
+
+def _scaled(matrix: Tensor, free: Tensor) -> tuple[Tensor, Tensor]:
+    """The matrix (M, D, D) with a diagonal of 1 and nothing of what is not free, and the scale (M, D) to that."""
+    diagonal = matrix.diagonal(dim1=-2, dim2=-1)
+    scale = torch.where(free, diagonal.clamp(min=1e-300).rsqrt(), 0.0)
+    return matrix * _outer(scale) + torch.diag_embed((~free).to(matrix)), scale
+
+
+def _variances(problem: Problem, x: Tensor, which: Tensor, inverse: Tensor) -> tuple[Tensor, Tensor]:
+    """The variance of each raw value, and the degrees of freedom of its estimate, each (M, D)."""
+    by_channel = inverse[:, problem.index]  # (M, C, P, D)
+    own = torch.stack([inverse[:, index][:, :, index] for index in problem.index], dim=1)  # (M, C, P, P)
+    variance, even, even_squared = (torch.zeros_like(x) for _ in range(3))
+    for piece in problem.data.chunks(problem.channels * len(x)):
+        data = piece.rows(which)
+        residuals, columns, slope = problem.jacobian(x, data, which)  # (M, C, N), (M, C, P, N), (M, C, N)
+        influence = (by_channel.mT @ columns).square_()  # (M, C, D, N)
+        if data.sigma is not None and problem.plan.robust is None:
+            spread = (slope * data.sigma).square()
         else:
-            left = 1 - torch.einsum("ncp,cpq,ncq->nc", columns, own, columns)
+            left = 1 - (columns * (own @ columns)).sum(2)
             spread = torch.where(left > _ALONE, (residuals / left.clamp(min=_ALONE)).square(), math.inf)
-        touched = influence > 1e-24 * inverse.diagonal()  # an infinite variance concerns only whom it reaches
-        variance += torch.where(touched, influence * spread.unsqueeze(-1), 0.0).sum((0, 1))
-        alike = influence * data.root_weight.square().expand_as(residuals).unsqueeze(-1)  # as if noise were constant
-        even += alike.sum((0, 1))
-        even_squared += alike.square().sum((0, 1))
+        if bool(spread.isfinite().all()):
+            variance += (influence @ spread.unsqueeze(-1)).sum((1, 3))
+        else:  # an infinite variance concerns only whom it reaches
+            touched = influence > 1e-24 * inverse.diagonal(dim1=-2, dim2=-1)[:, None, :, None]
+            variance += torch.where(touched, influence * spread.unsqueeze(2), 0.0).sum((1, 3))
+        if data.sigma is None or problem.plan.robust is not None:
+            weight = data.root_weight.square().expand_as(residuals).unsqueeze(-1)  # as if noise were constant
+            even += (influence @ weight).sum((1, 3))
+            even_squared += (influence.square_() @ weight.square()).sum((1, 3))
     return variance, (even.square() / even_squared.clamp(min=1e-300)).clamp(min=1)
 
 
-def _known_variance(problem: Problem, x: Tensor, data: Data) -> Tensor:
-    """The variances of the residuals (N, C) that follow from the samples' sigma."""
-    f = problem.f(x, data)
-    ones = torch.ones_like(f)
-    slope = jvp(lambda v: problem.loss_kind.difference(v, data.y, data.c, problem.scales), (f,), (ones,))[1]
-    return torch.square(data.root_weight * slope * data.sigma)
-
-
-def _undetermined(matrix: Tensor, held: Tensor) -> Tensor:
-    """Which values take part in a direction along which no residual changes, (D,) bool."""
-    diagonal = matrix.diagonal()
-    blind = ~held & (diagonal <= 0)
-    at = (~held & (diagonal > 0)).nonzero().squeeze(-1)
-    if at.numel():
-        scale = diagonal[at].rsqrt()
-        eigenvalues, vectors = torch.linalg.eigh(scale.unsqueeze(-1) * matrix[at][:, at] * scale)
-        free_directions = vectors[:, eigenvalues < _RANK * eigenvalues[-1]]
-        blind[at] |= (free_directions.abs() > 0.1).any(-1)
-    return blind
+def _undetermined(matrix: Tensor, held: Tensor, silent: Tensor) -> Tensor:
+    """Which values take part in a direction along which no residual changes, (M, D) bool."""
+    diagonal = matrix.diagonal(dim1=-2, dim2=-1)
+    blind = ~held & (diagonal <= silent.unsqueeze(-1))
+    seen = ~held & ~blind
+    eigenvalues, vectors = torch.linalg.eigh(_scaled(matrix, seen)[0])
+    silent_directions = eigenvalues < _RANK * eigenvalues[..., -1:]
+    unseen: Tensor = seen & ((vectors.abs() > 0.1) & silent_directions.unsqueeze(-2)).any(-1)
+    return blind | unseen
 
 
 def _natural(problem: Problem, x: Tensor, error: Tensor, factor: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -112,16 +122,17 @@ def _natural(problem: Problem, x: Tensor, error: Tensor, factor: Tensor) -> tupl
     high = (x + factor * error).clamp(min=problem.low, max=problem.high)
     for key, at in problem.slices.items():
         if problem.plan.form.parameters[key].scale == "log":
-            standard_error[at] = error[at] * torch.exp(x[at])
-            low[at], high[at] = torch.exp(low[at]), torch.exp(high[at])
+            standard_error[:, at] = error[:, at] * torch.exp(x[:, at])
+            low[:, at], high[:, at] = torch.exp(low[:, at]), torch.exp(high[:, at])
     return standard_error, low, high
 
 
 def t_quantile(freedom: Tensor) -> Tensor:
     """Student's t that leaves 2.5 % above it, for degrees of freedom from 1 up (any shape); relative error below 1e-9.
 
-    From 1000 degrees on by its expansion about the normal quantile (Abramowitz and Stegun 26.7.5), below by bisection
-    of the distribution function, whose integral over theta = atan(t / sqrt(freedom)) is smooth.
+    From 1000 degrees on by its expansion about the normal quantile (Abramowitz and Stegun 26.7.5). Below, by Newton's
+    method on the distribution function of theta = atan(t / sqrt(freedom)), whose integrand is smooth and falls, so
+    that the steps rise to the quantile from any smaller start.
     """
     z = NORMAL_QUANTILE
     expansion = (
@@ -131,16 +142,12 @@ def t_quantile(freedom: Tensor) -> Tensor:
     )
     many = z + sum((term / freedom**k for k, term in enumerate(expansion, start=1)), torch.zeros_like(freedom))
     few = freedom.clamp(max=1000)
-    nodes = torch.linspace(0, 1, 401, dtype=torch.float64)
-    simpson = torch.ones_like(nodes)
-    simpson[1:-1:2], simpson[2:-1:2] = 4, 2
+    gauss = np.polynomial.legendre.leggauss(24)
+    nodes, rule = torch.from_numpy(0.5 * (gauss[0] + 1)), torch.from_numpy(0.5 * gauss[1])
     log_norm = torch.lgamma((few + 1) / 2) - torch.lgamma(few / 2) - 0.5 * math.log(math.pi)
-    low, high = torch.full_like(few, 1.9), torch.full_like(few, 13.0)  # of infinitely many degrees, and of one
-    for _ in range(45):
-        middle = 0.5 * (low + high)
-        end = torch.atan(middle / few.sqrt())
-        cosines = torch.cos(end.unsqueeze(-1) * nodes)
-        integrand = torch.exp(log_norm.unsqueeze(-1) + (few.unsqueeze(-1) - 1) * torch.log(cosines))
-        below = (simpson * integrand).sum(-1) * end / 1200 < 0.475
-        low, high = torch.where(below, middle, low), torch.where(below, high, middle)
-    return torch.where(freedom < 1000, 0.5 * (low + high), many)
+    theta = torch.atan(1.9 / few.sqrt())  # below that of infinitely many degrees
+    for _ in range(8):
+        cosines = torch.cos(theta.unsqueeze(-1) * nodes)
+        below = torch.exp(log_norm.unsqueeze(-1) + (few.unsqueeze(-1) - 1) * torch.log(cosines)) @ rule * theta
+        theta = theta + (0.475 - below) / torch.exp(log_norm + (few - 1) * torch.log(torch.cos(theta)))
+    return torch.where(freedom < 1000, few.sqrt() * torch.tan(theta), many)

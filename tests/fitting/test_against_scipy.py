@@ -29,10 +29,11 @@ def best_of_scipy(samples: bc.Samples, text: str, starts: int) -> float:
     columns = np.broadcast_to(problem.index.numpy(), rows.shape)
 
     def residuals(x: np.ndarray) -> np.ndarray:
-        return problem.residuals(torch.from_numpy(x), problem.data).reshape(-1).numpy()
+        f = problem.f(torch.from_numpy(x).unsqueeze(0), problem.data)
+        return problem.residuals(f, problem.data, None)[1][0].T.reshape(-1).numpy()
 
     def jacobian(x: np.ndarray) -> np.ndarray:
-        values = problem.jacobian(torch.from_numpy(x), problem.data)[1].numpy()
+        values = problem.jacobian(torch.from_numpy(x).unsqueeze(0), problem.data)[1][0].permute(2, 0, 1).numpy()
         shape = (count * channels, problem.size)
         return scipy.sparse.csr_matrix((values.reshape(-1), (rows.reshape(-1), columns.reshape(-1))), shape).toarray()
 

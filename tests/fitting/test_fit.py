@@ -38,7 +38,7 @@ def test_every_optimizer_reaches_the_same_optimum(optimizer: str) -> None:
         assert max(p.loss for p in seen if p.stage == "fit") > 1.05 * best
     assert fit.status == "converged"
     assert fit.objective == pytest.approx(best, rel=1e-8)
-    assert fit.cost.optimizer == ("least_squares" if optimizer == "auto" else optimizer)
+    assert fit.cost.optimizer == ("variable_projection" if optimizer == "auto" else optimizer)
 
 
 MATERIALS = {
@@ -214,6 +214,31 @@ def test_other_losses_find_the_optimum_that_some_start_finds() -> None:
     found = bc.fit(samples, text.format(""), loss="cube_root").objective
     by_hand = [bc.fit(samples, text.format(f", m={m}"), loss="cube_root").objective for m in (0.02, 0.1, 0.3, 0.6)]
     assert found <= 1.0001 * min(by_hand)
+
+
+def test_bounds_hold_and_starts_lead_to_their_optimum() -> None:
+    samples = measured_from("lambert(kd=0.1) + ward_bounded(isotropic, rs=0.1, a=0.3)", noise=0.01)
+    for loss in bc.LOSSES:
+        fit = bc.fit(samples, MODEL, loss=loss, bounds={"ward_bounded.a": (0.01, 0.2), "lambert.kd": (0.15, 1.0)})
+        assert 0.01 <= float(fit.parameters["ward_bounded.a"]) <= 0.2 * (1 + 1e-15)
+        assert float(fit.parameters["lambert.kd"]) >= 0.15
+    free = bc.fit(samples, MODEL)
+    assert bc.fit(samples, MODEL, starts=[{"ward_bounded.a": 5.0}]).objective == pytest.approx(free.objective, rel=1e-9)
+    assert bc.fit(samples, MODEL, starts=[{}]).cost.starts == free.cost.starts + 1
+
+
+def test_steep_samples_are_left_out_and_counted(three_channels: bc.Samples) -> None:
+    limit = math.radians(60)
+    fit = bc.fit(three_channels, MODEL, max_theta=limit)
+    kept = (three_channels.wi[:, 2] >= math.cos(limit)) & (three_channels.wo[:, 2] >= math.cos(limit))
+    same = bc.fit(three_channels.subset(kept), MODEL)
+    assert fit.objective == same.objective
+    report = fit.to_dict()["data"]
+    assert report["samples"] == int(kept.sum())
+    assert report["masked"] == [{"reason": "a direction steeper than 60 degrees", "count": int((~kept).sum())}]
+    assert "a direction steeper than 60 degrees" in fit.report()
+    with pytest.raises(BrdfError, match=r"^Expected max_theta to leave at least one sample, got 0\.001 radians"):
+        bc.fit(three_channels, MODEL, max_theta=0.001)
 
 
 def test_samples_must_be_samples() -> None:

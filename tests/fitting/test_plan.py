@@ -40,6 +40,21 @@ def test_the_check_knows_what_the_data_decide() -> None:
         check(1, "ward", fixed={"ward.ax": 0.1})
 
 
+def test_bounds_narrow_the_box_and_what_starts_are_drawn_from() -> None:
+    made = plan(1, "lambert + kurt", bounds={"kurt.m": (0.01, 0.2), "kurt.alpha": (0.6, 0.8)})
+    assert [float(end) for end in made.limits("kurt.m")] == [0.01, 0.2]
+    assert made.search_range("kurt.m") == (0.01, 0.2)
+    assert made.search_range("kurt.alpha") == (0.6, 0.8)  # outside the usual search
+    assert made.search_range("kurt.f0") == (0, 1)
+
+
+def test_starts_are_the_texts_and_the_users() -> None:
+    assert plan(1, "lambert + kurt").starts == ()
+    made = plan(1, "lambert + kurt(m=0.3)", starts=[{"kurt.alpha": 0.4}, {"kurt.m": 0.01}])
+    assert [float(start["kurt.m"]) for start in made.starts] == [0.3, 0.3, 0.01]
+    assert float(made.starts[1]["kurt.alpha"]) == 0.4
+
+
 def test_fixed_values_are_not_free() -> None:
     made = plan(1, "lambert + kurt", fixed={"kurt.f0": 0.5})
     assert "kurt.f0" not in made.free
@@ -89,6 +104,35 @@ REFUSED = {
         "fixed within [0, 0.175]",
     ),
     "tie of a wrong shape": ({"model": "kurt(m=lambert.kd) + lambert"}, ParameterError, "kurt.m", "one number"),
+    "bounds key": ({"bounds": {"kurt.mm": (0.1, 1)}}, UnknownNameError, "bounds", "Did you mean 'kurt.m'"),
+    "bounds no mapping": ({"bounds": [("kurt.m", 0.1, 1)]}, ParameterError, "bounds", "got list"),
+    "bounds reversed": ({"bounds": {"kurt.m": (1, 0.1)}}, ParameterError, "bounds", "the lower one first"),
+    "bounds beyond the box": ({"bounds": {"kurt.f0": (0.1, 2)}}, ParameterError, "bounds", "lie in [0, 1]"),
+    "bounds against a start": (
+        {"model": "lambert + kurt(m=0.5)", "bounds": {"kurt.m": (0.01, 0.2)}},
+        ParameterError,
+        "kurt.m",
+        "within its bounds (0.01, 0.2), got 0.5",
+    ),
+    "bounds against a fixed value": (
+        {"fixed": {"kurt.m": 0.5}, "bounds": {"kurt.m": (0.01, 0.2)}},
+        ParameterError,
+        "kurt.m",
+        "got 0.5",
+    ),
+    "bounds against a tie": (
+        {"model": "lambert(kd=0.175 - kurt.ks) + kurt", "bounds": {"kurt.ks": (0.2, 0.4)}},
+        ParameterError,
+        "bounds",
+        "those leave [0, 0.175]",
+    ),
+    "starts key": ({"starts": [{"kurt.mm": 0.1}]}, UnknownNameError, "starts", "Did you mean 'kurt.m'"),
+    "starts no list": ({"starts": {"kurt.m": 0.1}}, ParameterError, "starts", "got str in it"),
+    "start beyond the box": ({"starts": [{"kurt.m": 100}]}, ParameterError, "kurt.m", "[0.0001, 10], got 100"),
+    "robust form": ({"robust": "cauch"}, UnknownNameError, "robust", "Did you mean 'cauchy'"),
+    "robust scale alone": ({"robust_scale": 0.1}, ParameterError, "robust_scale", "Name one of soft_l1, cauchy"),
+    "robust scale": ({"robust": "cauchy", "robust_scale": 0}, ParameterError, "robust_scale", "positive number, got 0"),
+    "angle in degrees": ({"max_theta": 80}, ParameterError, "max_theta", "math.radians(80)"),
     "contradiction": ({"model": "kurt(isotropic, mx=0.2)"}, ModelTextError, "model", "Drop one of them"),
 }
 

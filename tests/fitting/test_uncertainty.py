@@ -9,6 +9,7 @@ from fit_cases import TRUE, measured_from
 
 import brdfcore as bc
 from brdfcore.demo import DATA, MATERIAL, MODEL, linoleum
+from brdfcore.fitting import fit_batch
 from brdfcore.fitting.uncertainty import t_quantile
 from brdfcore.geometry import geometry
 
@@ -101,10 +102,9 @@ def covered_without_sigma(case: str, seeds: int, weigh: bool = False) -> dict[st
     deviation = CASES[case](f, clean.wi[:, 2:])
     weight = np.random.default_rng(1).choice([0.1, 1.0, 10.0], len(f)) if weigh else None
     covered = dict.fromkeys(TABLE_1, 0)
-    for seed in range(seeds):
-        noise = torch.from_numpy(np.random.default_rng(seed).standard_normal(f.shape))
-        samples = bc.Samples(clean.wi, clean.wo, f + deviation * noise, weight=weight)
-        fit = bc.fit(samples, "lambert + ward_bounded")
+    noise = [torch.from_numpy(np.random.default_rng(seed).standard_normal(f.shape)) for seed in range(seeds)]
+    several = [bc.Samples(clean.wi, clean.wo, f + deviation * one, weight=weight) for one in noise]
+    for fit in fit_batch(several, "lambert + ward_bounded"):
         for key, true in TABLE_1.items():
             low, high = fit.intervals[key].tolist()
             covered[key] += low <= true <= high
@@ -215,8 +215,7 @@ def cramer_rao(samples: bc.Samples) -> dict[str, float]:
 def check_coverage(seeds: int) -> None:
     least = cramer_rao(linoleum())
     covered, widths = dict.fromkeys(TABLE_1, 0), {key: [] for key in TABLE_1}
-    for seed in range(seeds):
-        fit = bc.fit(linoleum(seed), MODEL)
+    for fit in fit_batch([linoleum(seed) for seed in range(seeds)], MODEL):
         for key, true in TABLE_1.items():
             low, high = fit.intervals[key].tolist()
             covered[key] += low <= true <= high

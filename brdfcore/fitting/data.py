@@ -1,0 +1,102 @@
+"""What residuals are computed from: the samples of one material or several that share their directions."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from ..formats.samples import Samples
+from ..geometry import Geometry, geometry
+from .losses import Loss, Scales
+
+_CHUNK = 32768  # samples times starts of one piece: what a basis computes on the way stays in the cache
+
+
+@dataclass(frozen=True)
+class Data:
+    """The samples of M materials, or a piece of them; N stands last, so that sums over the samples are contiguous."""
+
+    g: Geometry  # quantities (N, 1)
+    c: Tensor  # (N,) cos theta_i
+    y: Tensor  # (M, C, N)
+    root_weight: Tensor  # (M, C, N), (1, 1, N) or between, square roots of the weights
+    sigma: Tensor | None  # (M, C, N)
+    scales: Scales
+
+    @classmethod
+    def of(cls, samples: Sequence[Samples], needs: frozenset[str], loss: Loss, scales: Scales | None) -> "Data":
+        """The data of samples with equal directions; the scales are theirs unless they are given."""
+        first = samples[0]
+        sigmas = [one.sigma.T for one in samples if one.sigma is not None]
+        return cls(
+            geometry(first.wi, first.wo, needs),
+            first.wi[:, 2].contiguous(),
+            torch.stack([one.values.T for one in samples]),
+            stacked_weights(samples, loss).sqrt() if not sigmas else _alike([root_weights(s, loss) for s in samples]),
+            torch.stack(sigmas) if len(sigmas) == len(samples) else None,
+            scales or Scales.stacked([Scales.of(one.values, one.wi[:, 2:]) for one in samples]),
+        )
+
+    def slice(self, begin: int, end: int) -> "Data":
+        """The samples from begin to end."""
+        return Data(
+            Geometry(*(None if q is None else q[begin:end] for q in self.g)),
+            self.c[begin:end],
+            self.y[..., begin:end],
+            self.root_weight[..., begin:end],
+            None if self.sigma is None else self.sigma[..., begin:end],
+            self.scales,
+        )
+
+    def rows(self, which: Tensor) -> "Data":
+        """The data of the materials that the index (S,) names, one a row."""
+        if len(self.y) == 1:
+            return self  # broadcasts
+        return Data(
+            self.g,
+            self.c,
+            self.y[which],
+            self.root_weight if len(self.root_weight) == 1 else self.root_weight[which],
+            None if self.sigma is None else self.sigma[which],
+            self.scales.rows(which),
+        )
+
+    def chunks(self, starts: int) -> Iterator["Data"]:
+        """The data in pieces small enough for so many starts at once."""
+        count = len(self.c)
+        step = max(1, _CHUNK // max(1, starts))
+        for begin in range(0, count, step):
+            yield self.slice(begin, min(begin + step, count)) if step < count else self
+
+
+def _alike(several: Sequence[Tensor]) -> Tensor:
+    """The weights (N, 1) or (N, C) of several materials, (M, 1, N) or (M, C, N), and M = 1 where they are equal."""
+    if all(torch.equal(one, several[0]) for one in several[1:]):
+        several = several[:1]
+    return torch.stack([one.T for one in several])
+
+
+def stacked_weights(samples: Sequence[Samples], loss: Loss) -> Tensor:
+    """The weights of several materials, (M, 1, N), or (1, 1, N) where they are equal."""
+    if all(one.weight is None and one.cell is None for one in samples):
+        samples = samples[:1]
+    return _alike([weights(one, loss) for one in samples])
+
+
+def weights(samples: Samples, loss: Loss) -> Tensor:
+    """The weights w of the loss's definition, (N, 1): the data's, else 1, times a grid cell's measure."""
+    own = samples.weight if samples.weight is not None else torch.ones(len(samples), dtype=torch.float64)
+    if loss.uses_cells and samples.cell is not None:
+        own = own * samples.cell
+    return own.unsqueeze(-1)
+
+
+def root_weights(samples: Samples, loss: Loss) -> Tensor:
+    """Square roots of the weights that a fit uses, (N, 1) or (N, C).
+
+    With a known sigma and no weight, a statistical loss weighs by the inverse variance of c y: that is chi-square.
+    """
+    if loss.statistical and samples.sigma is not None and samples.weight is None:
+        return 1 / (samples.wi[:, 2:] * samples.sigma)
+    return weights(samples, loss).sqrt()

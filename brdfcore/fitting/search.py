@@ -1,0 +1,203 @@
+"""From samples to optima: scan, race of the starts on a subset, then the winner on all the data.
+
+Where residuals are linear in f, starts run over the shapes alone by variable projection; where they are not, those
+solutions of the cosine loss join the starts of Levenberg-Marquardt on all values. The winner ends with that too,
+whatever came before: it keeps every end of the box, and computes residuals one by one, so that none cancel.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from ..formats.samples import Samples
+from .adam import adam
+from .lbfgs import lbfgs
+from .least_squares import least_squares
+from .levenberg_marquardt import OnStep, Outcome
+from .losses import LOSSES
+from .plan import Plan
+from .problem import Problem
+from .projection import Projection
+from .result import Cost
+from .robust import ROBUST, SPREAD
+from .starts import scan, several_lobes
+from .variable_projection import variable_projection
+
+SUBSET = 2000  # samples on which starts are told apart; the optimum is always polished on all
+_STARTS = 4  # best points of the scan, which run as one batch; of one shape half of them
+_MANY_STARTS = 16  # the same of two lobes and more, whose optima are many
+_DESCENTS = 2  # starts of Adam and LBFGS, which run one after the other
+_POLISH = 300  # their steps on all the data, after the subset
+_NONLINEAR = 6  # starts of a lone lobe under a loss that is not linear in f, whose steps move every reflectance
+_RACE_ALL = 1e-6  # of the loss, the same as the next where reflectances move too
+_RACE = 1e-4  # of the loss: what another step would gain once a start's end is clear
+
+Say = Callable[[str, float, float], None]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where M materials ended, and what it took."""
+
+    problem: Problem  # on all the data
+    outcome: Outcome  # a row a material
+    starts: int
+    evaluations: int
+    iterations: int
+    optimizer: str
+
+    def cost(self, materials: int) -> Cost:
+        """What each of so many materials cost but for the time, which ends later; uncertainty evaluates once more."""
+        return Cost(0.0, self.evaluations // materials + 1, self.iterations, self.starts, self.optimizer)
+
+
+def search(plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, seed: int, say: Say) -> Found:
+    """The best optimum that the scan's starts lead to, for each of the materials that share their directions."""
+    say("scan", 0.0, torch.nan)
+    if plan.robust is None or plan.robust_scale is not None:
+        given = (
+            None if plan.robust_scale is None else torch.full((len(samples),), plan.robust_scale, dtype=torch.float64)
+        )
+        return _found(plan, samples, loss, optimizer, seed, say, given)
+    # outliers inflate the spread about the plain optimum, so it is taken again about the robust one
+    plain = _found(replace(plan, robust=None), samples, loss, optimizer, seed, _part(say, 0.0, 0.4), None)
+    scale = _spread(plain) * ROBUST[plan.robust].multiple
+    robust = _found(plan, samples, loss, optimizer, seed, _part(say, 0.4, 0.8), scale)
+    scale = _spread(robust) * ROBUST[plan.robust].multiple
+    problem = Problem(plan, samples, LOSSES[loss], robust.problem.data.scales, scale)
+    outcome = robust.outcome
+    if problem.size:
+        outcome = least_squares(problem, outcome.x, torch.arange(len(samples)), on_step=_tell(say, 0.8, 0.9))
+    return replace(
+        robust,
+        problem=problem,
+        outcome=outcome,
+        evaluations=plain.evaluations + robust.evaluations + problem.evaluations,
+        iterations=plain.iterations + robust.iterations + outcome.iterations,
+    )
+
+
+def _spread(found: Found) -> Tensor:
+    """The spread of each material's plain residuals where it ended, (M,); above 0 where the fit is exact."""
+    problem, which = found.problem, torch.arange(len(found.outcome.x))
+    plain = Problem(replace(problem.plan, robust=None), [], problem.loss_kind, data=problem.data)
+    data = problem.data.rows(which)
+    r = plain.residuals(problem.f(found.outcome.x, data), data, which)[1].flatten(1)
+    least = 1e-12 * (problem.squares() / r.shape[1]).sqrt()
+    return torch.maximum(SPREAD * r.abs().median(1).values, least.clamp(min=1e-300))
+
+
+def _found(
+    plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, seed: int, say: Say, robust_scale: Tensor | None
+) -> Found:
+    """The search under one loss whose scale is known."""
+    kind = LOSSES[loss]
+    whole = Problem(plan, samples, kind, robust_scale=robust_scale)
+    coarse, few = whole, list(samples)
+    if len(samples[0]) > SUBSET:
+        chosen = torch.randperm(len(samples[0]), generator=torch.Generator().manual_seed(seed))[:SUBSET]
+        few = [one.subset(chosen.sort().values) for one in samples]
+        coarse = Problem(plan, few, kind, whole.data.scales, robust_scale)
+    if not whole.size:
+        x, which = torch.zeros(len(samples), 0, dtype=torch.float64), torch.arange(len(samples))
+        outcome = Outcome(x, whole.loss(x, which), torch.ones(len(x), dtype=torch.bool), 0)
+        return Found(whole, outcome, 1, whole.evaluations, 0, "none")
+    if optimizer in ("auto", "least_squares"):
+        return _race(whole, coarse, few, optimizer, seed, say)
+    return _descents(whole, coarse, few, optimizer, seed, say)
+
+
+def _kindred(problem: Problem, samples: Sequence[Samples]) -> Projection:
+    """The projection of a problem, or where its residuals are not linear, of the cosine loss on its samples."""
+    if problem.linear:
+        return Projection(problem)
+    return Projection(Problem(replace(problem.plan, robust=None), samples, LOSSES["cosine"], problem.data.scales))
+
+
+def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: str, seed: int, say: Say) -> Found:
+    """Batched starts on the subset, then the best on all the data."""
+    materials = whole.materials
+    projection = _kindred(coarse, few)
+    linear = projection.problem is coarse
+    few_starts = _STARTS if len(projection.shapes) > 1 else _STARTS // 2
+    count = _MANY_STARTS if several_lobes(projection) else few_starts
+    starts = scan(coarse, projection, count, seed)
+    each = starts.shape[1]
+    which = torch.arange(materials).repeat_interleave(each)
+    x = starts.reshape(-1, whole.size)
+    tell = _tell(say, 0.05, 0.5)
+    iterations = 0
+    projected = optimizer == "auto" and projection.useful and bool(projection.shapes)
+    if projected:
+        raced = variable_projection(projection, x, which, _RACE, on_step=tell)
+        iterations += raced.iterations
+        if linear:
+            outcome = least_squares(coarse, raced.x, which, on_step=tell) if projection.may_leave_the_box else raced
+        else:
+            x = torch.cat([starts, raced.x.reshape(starts.shape)], dim=1).reshape(-1, whole.size)
+            kept = _MANY_STARTS if several_lobes(projection) else _NONLINEAR
+            x, which = _lowest(coarse, x, min(kept, 2 * each))
+    if not (projected and linear):
+        outcome = least_squares(coarse, x, which, _RACE_ALL, on_step=tell)
+        iterations += outcome.iterations
+    best = outcome.pick(_best(outcome.loss, materials))
+    name = "variable_projection" if projected and linear else "least_squares"
+    rows = torch.arange(materials)
+    tell = _tell(say, 0.5, 0.9)
+    x = best.x
+    if projected and linear:
+        wholly = projection if whole is coarse else Projection(whole)
+        best = variable_projection(wholly, x, rows, on_step=tell)
+        iterations += best.iterations
+        x = best.x
+    best = least_squares(whole, x, rows, on_step=tell)
+    iterations += best.iterations
+    seen = {id(p): p.evaluations for p in (whole, coarse, projection.problem)}
+    return Found(whole, best, each, sum(seen.values()), iterations, name)
+
+
+def _lowest(problem: Problem, x: Tensor, count: int) -> tuple[Tensor, Tensor]:
+    """The rows x (M R, D) whose own loss is lowest, so many a material, and the material of each."""
+    which = torch.arange(problem.materials).repeat_interleave(len(x) // problem.materials)
+    loss = problem.loss(x, which)
+    order = torch.where(loss.isfinite(), loss, torch.inf).reshape(problem.materials, -1).argsort(dim=1)[:, :count]
+    chosen = order + order.new_tensor(range(problem.materials)).unsqueeze(-1) * (len(x) // problem.materials)
+    return x[chosen.reshape(-1)], torch.arange(problem.materials).repeat_interleave(count)
+
+
+def _best(loss: Tensor, materials: int) -> Tensor:
+    """The row of each material whose loss is lowest, (M,)."""
+    by_material = torch.where(loss.isfinite(), loss, torch.inf).reshape(materials, -1)
+    return by_material.argmin(1) + by_material.shape[1] * torch.arange(materials)
+
+
+def _descents(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: str, seed: int, say: Say) -> Found:
+    """Adam or LBFGS from a few starts one after the other, then from the best on all the data."""
+    run = {"adam": adam, "lbfgs": lbfgs}[optimizer]
+    starts = scan(coarse, _kindred(coarse, few), _DESCENTS, seed)
+    ends: list[Outcome] = []
+    share = 0.9 / starts[..., 0].numel()
+    for material in range(whole.materials):
+        which = torch.tensor([material])
+        runs: list[Outcome] = []
+        for start in starts[material]:
+            done = 0.05 + share * (len(ends) * starts.shape[1] + len(runs))
+            runs.append(run(coarse, start.unsqueeze(0), which, on_step=_tell(say, done, done + share)))
+        best = min(runs, key=lambda outcome: float(outcome.loss[0]))
+        if coarse is not whole:
+            best = run(whole, best.x, which, max_iterations=_POLISH)
+        ends.append(Outcome(best.x, best.loss, best.converged, sum(r.iterations for r in runs)))
+    x, loss, converged, steps, _ = zip(*ends, strict=True)
+    outcome = Outcome(torch.cat(x), torch.cat(loss), torch.cat(converged), sum(steps))
+    evaluations = whole.evaluations + (coarse.evaluations if coarse is not whole else 0)
+    return Found(whole, outcome, starts.shape[1], evaluations, sum(steps), optimizer)
+
+
+def _part(say: Say, begin: float, end: float) -> Say:
+    return lambda stage, fraction, loss: say(stage, begin + (end - begin) * fraction, loss)
+
+
+def _tell(say: Say, begin: float, end: float) -> OnStep:
+    return lambda i, value: say("fit", begin + (end - begin) * (1 - 0.95**i), value)

@@ -1,0 +1,184 @@
+"""The reflectances that minimise a quadratic inside their box, exactly and in batches.
+
+    minimise z^T G z - 2 r^T z  over a polytope
+
+Up to `MOST` unknowns a channel, every face of the polytope is solved as if it were a plane, and the best of those
+solutions that lie in the polytope is the minimum: first the faces with reflectances at 0, then, only where one exceeds
+its upper end, all of them. More unknowns, or gray ones beside coloured ones, are solved by exchanging active ends.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+MOST = 5
+_RIDGE = 1e-13  # of the scaled diagonal: two equal columns share their reflectance, and nothing is divided by 0
+_EXCHANGES = 20  # of all wrong ends at once; then one at a time, which ends
+
+
+@dataclass(frozen=True)
+class Block:
+    """Unknowns with ends in common: a triangle z_i, z_j >= 0, z_i + z_j <= cap, or one with a box, or one above 0."""
+
+    at: tuple[int, ...]
+    low: Tensor  # (C,)
+    high: Tensor  # (C,) the cap of a triangle; infinite where there is none
+
+    def faces(self) -> list[tuple[bool, Tensor, Tensor]]:
+        """Whether a face touches the upper end, its origin (C, n) and its directions (n, n)."""
+        zero = torch.zeros_like(self.low)
+        if len(self.at) == 1:
+            one, none = torch.eye(1, dtype=torch.float64), torch.zeros(1, 1, dtype=torch.float64)
+            found = [(False, self.low, one), (False, self.low, none), (True, self.high, none)]
+            return [(upper, o.unsqueeze(-1), d) for upper, o, d in found if bool(o.isfinite().all())]
+        corner, tip_i, tip_j = (torch.stack(p, dim=-1) for p in ((zero, zero), (self.high, zero), (zero, self.high)))
+        inner, along_i, along_j, edge, none = torch.tensor(
+            [[[1, 0], [0, 1]], [[1, 0], [0, 0]], [[0, 0], [0, 1]], [[1, 0], [-1, 0]], [[0, 0], [0, 0]]],
+            dtype=torch.float64,
+        )
+        return [
+            *((False, corner, directions) for directions in (inner, along_i, along_j, none)),
+            (True, tip_j, edge),
+            (True, tip_i, none),
+            (True, tip_j, none),
+        ]
+
+
+@dataclass(frozen=True)
+class Faces:
+    """The faces of the polytope of every channel: z = origin + directions t."""
+
+    blocks: tuple[Block, ...]
+    origin: Tensor  # (F, C, L)
+    directions: Tensor  # (F, L, L), 0 in the columns of what the face holds
+    lower: int  # how many of the first faces touch no upper end
+
+    @classmethod
+    def of(cls, blocks: tuple[Block, ...]) -> "Faces":
+        """The faces of the product of the blocks."""
+        count = sum(len(block.at) for block in blocks)
+        made = []
+        for choice in itertools.product(*(block.faces() for block in blocks)):
+            origin = torch.zeros(len(blocks[0].low), count, dtype=torch.float64)
+            directions = torch.zeros(count, count, dtype=torch.float64)
+            for block, (_, o, d) in zip(blocks, choice, strict=True):
+                at = torch.tensor(block.at)
+                origin[:, at] = o
+                directions[at.unsqueeze(-1), at] = d
+            made.append((any(upper for upper, _, _ in choice), origin, directions))
+        made.sort(key=lambda face: face[0])
+        lower = sum(not upper for upper, _, _ in made)
+        return cls(blocks, torch.stack([o for _, o, _ in made]), torch.stack([d for _, _, d in made]), lower)
+
+    def outside(self, z: Tensor, *, below: bool) -> Tensor:
+        """Where z (..., C, L) leaves the polytope, through its lower ends or its upper ones, (..., C)."""
+        out = torch.zeros(z.shape[:-1], dtype=torch.bool)
+        for block in self.blocks:
+            for i in block.at:
+                out |= (z[..., i] < block.low) if below else torch.zeros_like(out)
+            total = z[..., list(block.at)].sum(-1)
+            out |= torch.zeros_like(out) if below else total > block.high * (1 + 1e-12)
+        return out
+
+
+def solve_faces(faces: Faces, gram: Tensor, right: Tensor) -> tuple[Tensor, Tensor]:
+    """The minimum z (..., C, L) and the directions (..., C, L, L) of its face, for G (..., C, L, L), r (..., C, L)."""
+    shape = torch.broadcast_tensors(gram[..., 0], right)[0].shape  # broadcast_shapes would import half of torch
+    channels, count = shape[-2:]
+    gram = gram.expand(*shape, count).reshape(-1, channels, count, count)
+    right = right.expand(shape).reshape(-1, channels, count)
+    z, face = _best(faces, faces.origin[:1], faces.directions[:1], gram, right)
+    below = faces.outside(z, below=True).any(-1)
+    if bool(below.any()):
+        lower = faces.origin[: faces.lower], faces.directions[: faces.lower]
+        z[below], face[below] = _best(faces, *lower, gram[below], right[below])
+    beyond = faces.outside(z, below=False)
+    if bool(beyond.any()):
+        rows, channel = beyond.nonzero(as_tuple=True)
+        again, picked = _best(faces, faces.origin, faces.directions, gram[rows], right[rows], within=True)
+        each = torch.arange(len(rows))
+        z[rows, channel], face[rows, channel] = again[each, channel], picked[each, channel]
+    return z.reshape(shape), faces.directions[face].reshape(*shape, count)
+
+
+def _best(
+    faces: Faces, origin: Tensor, directions: Tensor, gram: Tensor, right: Tensor, *, within: bool = False
+) -> tuple[Tensor, Tensor]:
+    """The best feasible z (B, C, L) among the given faces, and which face it is on (B, C)."""
+    start = origin.unsqueeze(0)  # (1, F, C, L)
+    d = directions.unsqueeze(1)  # (F, 1, L, L)
+    g, r = gram.unsqueeze(1), right.unsqueeze(1)  # (B, 1, C, L, L), (B, 1, C, L)
+    slope = r - (g * start.unsqueeze(-2)).sum(-1) if bool(origin.any()) else r
+    if within:
+        system, wanted = d.mT @ g @ d, (d.mT @ slope.unsqueeze(-1)).squeeze(-1)
+        t = solve_definite(system, wanted)
+        z = start + (d @ t.unsqueeze(-1)).squeeze(-1)  # (B, F, C, L)
+    else:  # along axes: no products of tiny matrices
+        e = d.diagonal(dim1=-2, dim2=-1)
+        system, wanted = g * e.unsqueeze(-1) * e.unsqueeze(-2), slope * e
+        t = solve_definite(system, wanted)
+        z = start + t
+    value = -(t * wanted).sum(-1) - (start * (slope + r)).sum(-1)
+    wrong = faces.outside(z, below=True)
+    if within:
+        wrong |= faces.outside(z, below=False)
+    face = torch.where(wrong, torch.inf, value).argmin(1)  # (B, C)
+    return z.gather(1, face[:, None, :, None].expand(-1, 1, -1, z.shape[-1])).squeeze(1), face
+
+
+def solve_definite(matrix: Tensor, right: Tensor) -> Tensor:
+    """The solutions of small positive semidefinite systems (..., L, L), (..., L), 0 where a diagonal is 0.
+
+    Cholesky's elimination of the scaled matrix, written out by element so that all systems are eliminated at once:
+    LAPACK would be called for each.
+    """
+    count = matrix.shape[-1]
+    diagonal = [matrix[..., i, i] for i in range(count)]
+    scale = [torch.where(x > 0, x.clamp(min=1e-300).rsqrt(), 0.0) for x in diagonal]
+    m = [[matrix[..., i, j] * scale[i] * scale[j] for j in range(i)] for i in range(count)]
+    d = [torch.where(x > 0, 1 + _RIDGE, 1.0) for x in diagonal]
+    b = [right[..., i] * scale[i] for i in range(count)]
+    for j in range(count):
+        pivot = d[j].clamp(min=_RIDGE)
+        for i in range(j + 1, count):
+            factor = m[i][j] / pivot
+            for k in range(j + 1, i):
+                m[i][k] = m[i][k] - factor * m[k][j]
+            d[i] = d[i] - factor * m[i][j]
+            b[i] = b[i] - factor * b[j]
+    for i in reversed(range(count)):
+        for k in range(i + 1, count):
+            b[i] = b[i] - m[k][i] * b[k]
+        b[i] = b[i] / d[i].clamp(min=_RIDGE)
+    return torch.stack([scale[i] * b[i] for i in range(count)], dim=-1)
+
+
+def solve_box(gram: Tensor, right: Tensor, low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:
+    """The minimum z (..., D) in a box, and which unknowns are free there (..., D), for G (..., D, D), r (..., D)."""
+    diagonal = gram.diagonal(dim1=-2, dim2=-1)
+    scale = torch.where(diagonal > 0, diagonal.clamp(min=1e-300).rsqrt(), 1.0)
+    gram = scale.unsqueeze(-1) * gram * scale.unsqueeze(-2)
+    ends = low, high
+    right, low, high = right * scale, low / scale, high / scale
+    small = 1e-13 * right.abs().amax(-1, keepdim=True)
+    side = torch.zeros_like(right)  # -1 on the low end, 1 on the high one
+    z = low
+    for step in range(_EXCHANGES * (1 + right.shape[-1])):
+        free = side == 0
+        fixed = torch.where(side < 0, low, torch.where(side > 0, high, 0.0))
+        both = free.unsqueeze(-1) & free.unsqueeze(-2)
+        system = torch.where(both, gram, 0.0) + torch.diag_embed(torch.where(free, _RIDGE, 1.0))
+        wanted = torch.where(free, right - (gram @ fixed.unsqueeze(-1)).squeeze(-1), fixed)
+        z = torch.linalg.solve_ex(system, wanted.unsqueeze(-1))[0].squeeze(-1)
+        slope = (gram @ z.unsqueeze(-1)).squeeze(-1) - right
+        wrong = torch.where(free, (z < low) | (z > high), side * slope > small)
+        if not bool(wrong.any()):
+            break
+        if step >= _EXCHANGES:  # Murty's rule: only the last wrong one, which cannot cycle
+            last = wrong.shape[-1] - 1 - wrong.flip(-1).int().argmax(-1, keepdim=True)
+            wrong &= torch.zeros_like(wrong).scatter_(-1, last, value=True)
+        side = torch.where(wrong, torch.where(free, torch.where(z < low, -1.0, 1.0), 0.0), side)
+    inside = torch.minimum(torch.maximum(z * scale, ends[0]), ends[1])
+    return torch.where(side < 0, ends[0], torch.where(side > 0, ends[1], inside)), side == 0

@@ -1,0 +1,154 @@
+"""What optima are worth: values with intervals, errors under every loss, and sentences, for all materials at once."""
+
+import math
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from .. import __version__
+from ..formats.samples import Samples
+from ..models.material import Material
+from .data import Data, stacked_weights
+from .levenberg_marquardt import Outcome
+from .losses import LOSSES
+from .problem import Problem
+from .result import Cost, Fit
+from .uncertainty import Uncertainty, uncertainty
+
+
+def fits(
+    problem: Problem, outcome: Outcome, fitted: Sequence[Samples], given: Sequence[Samples], seed: int, cost: Cost
+) -> list[Fit]:
+    """What each material's optimum is worth; `given` are the samples before any were left out."""
+    plan, x, channels = problem.plan, outcome.x, fitted[0].channels
+    weighed = problem.loss_kind.statistical and fitted[0].sigma is not None and fitted[0].weight is None
+    known = uncertainty(problem, x, outcome.gram)
+    f = torch.cat([problem.f(x, piece) for piece in problem.data.chunks(len(x))], dim=-1)  # (M, C, N)
+    values = {key: value.squeeze(1).expand(len(x), -1) for key, value in _rows(problem, x).items()}
+    described = _described(problem, values, known, channels)
+    every_error = _errors(f, problem.data, fitted)
+    chi_square: list[float] | None = None
+    if problem.data.sigma is not None:
+        chi_square = ((f - problem.data.y) / problem.data.sigma).square().sum((1, 2)).tolist()
+    freedom, minima, ends = known.freedom.tolist(), outcome.loss.tolist(), outcome.converged.tolist()
+    found = []
+    for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
+        error = every_error[row]
+        parameters, standard_errors, intervals, undetermined = described[row]
+        found.append(
+            Fit(
+                form=plan.form,
+                values={key: value[row].reshape(plan.start[key].shape) for key, value in values.items()},
+                samples=samples,
+                parameters=parameters,
+                standard_errors=standard_errors,
+                intervals=intervals,
+                undetermined=undetermined,
+                errors=error,
+                loss=problem.loss_kind.name,
+                objective=minima[row] if weighed or plan.robust else error[problem.loss_kind.name],
+                status="converged" if ends[row] else "stopped_early",
+                message=_message(problem, known, row, converged=ends[row], several=len(channels) > 1, weighed=weighed),
+                choices=plan.choices,
+                fixed=tuple(sorted(plan.fixed)),
+                gray=tuple(sorted(plan.gray)),
+                per_channel=tuple(sorted(plan.per_channel)),
+                chi_square=None if chi_square is None else (chi_square[row], freedom[row]),
+                cost=cost,
+                channels=samples.channels,
+                provenance={"version": __version__, "torch": torch.__version__, "seed": seed, "input": whole.hash},
+            )
+        )
+    return found
+
+
+def _rows(problem: Problem, x: Tensor) -> dict[str, Tensor]:
+    """All natural values by key in the order of the text, (M, 1, n)."""
+    natural = problem.natural(x)
+    return {key: natural[key].reshape(-1, 1, natural[key].shape[-1] if natural[key].ndim else 1) for key in natural}
+
+
+def errors(material: Material, samples: Samples) -> dict[str, float]:
+    """The material's error under every loss by its definition, and `cosine_rms`, the root of the cosine loss's mean."""
+    with torch.no_grad():
+        pairs = zip(samples.wi.split(65536), samples.wo.split(65536), strict=True)
+        f = torch.cat([material.f(wi, wo) for wi, wo in pairs]).expand_as(samples.values)
+    data = Data.of([samples], frozenset(), LOSSES["cosine"], None)
+    return _errors(f.T.unsqueeze(0), data, [samples])[0]
+
+
+def _errors(f: Tensor, data: Data, samples: Sequence[Samples]) -> list[dict[str, float]]:
+    """The errors of values f (M, C, N), by material."""
+    found: dict[str, list[float]] = {}
+    for name, kind in LOSSES.items():
+        weight = stacked_weights(samples, kind)  # (M, 1, N), or (1, 1, N)
+        total = (weight * kind.difference(f, data.y, data.c, data.scales).square()).sum((1, 2))
+        root_mean = (total / (weight.sum((1, 2)) * f.shape[1])).sqrt()
+        found[name] = (root_mean if kind.is_mean else total).tolist()
+        if name == "cosine":
+            found["cosine_rms"] = root_mean.tolist()
+    return [{name: each[row] for name, each in found.items()} for row in range(len(f))]
+
+
+Described = tuple[dict[str, Tensor], dict[str, Tensor], dict[str, Tensor], tuple[str, ...]]
+
+
+def _described(
+    problem: Problem, values: dict[str, Tensor], known: Uncertainty, channels: tuple[str, ...]
+) -> list[Described]:
+    """Values, standard errors and intervals by key, tied parameters included, and what is undetermined, by material."""
+    form, start = problem.plan.form, problem.plan.start
+    materials = len(known.freedom)
+    found: list[Described] = [({}, {}, {}, ()) for _ in range(materials)]
+    for key in form.all_parameters:
+        tie = form.ties.get(key)
+        owner = key if tie is None else tie.owner
+        value = form.resolve(key, values)  # (M, n)
+        one = start[owner].ndim == 0 and (tie is None or tie.total is None or len(tie.total) == 1)
+        error = torch.full_like(value, math.nan)
+        low, high, blind = error, error, torch.zeros_like(error, dtype=torch.bool)
+        if owner in problem.slices:
+            at = problem.slices[owner]
+            error, low, high, blind = (
+                t[:, at].expand_as(value) for t in (known.standard_error, known.low, known.high, known.undetermined)
+            )
+            if tie is not None and tie.total is not None:
+                total = value + values[owner]
+                low, high = total - high, total - low
+            value = torch.where(blind, math.nan, value)
+        columns = (value, error, torch.stack([low, high], dim=-1))
+        each = zip(*(c[:, 0] if one else c for c in columns), blind.any(-1).tolist(), strict=True)
+        for row, (value_, error_, interval, some) in enumerate(each):
+            parameters, standard_errors, intervals, undetermined = found[row]
+            parameters[key], standard_errors[key], intervals[key] = value_, error_, interval
+            if some and tie is None:
+                names = [f"{key}[{channels[int(c)]}]" for c in blind[row].nonzero()]
+                names = [key] if bool(blind[row].all()) else names
+                found[row] = parameters, standard_errors, intervals, (*undetermined, *names)
+    return found
+
+
+def _message(problem: Problem, known: Uncertainty, row: int, *, converged: bool, several: bool, weighed: bool) -> str:
+    """What the user must know of a result, in sentences."""
+    if not problem.size:
+        parts = ["Every value is fixed, so this is an evaluation."]
+    elif converged:
+        parts = ["The optimum was reached; no step gains more than rounding."]
+    else:
+        parts = [
+            "The optimizer stopped before the optimum; treat values and intervals with care, or use least_squares."
+        ]
+    held, blind = known.held[row].tolist(), known.undetermined[row].tolist()
+    on_end = [key for key, at in problem.slices.items() if any(held[at])]
+    if on_end:
+        where = " in some channel" if several else ""
+        parts.append(f"{', '.join(on_end)} ended on an end of the box{where}, so no interval is given there.")
+    if any(blind):
+        unseen = [key for key, at in problem.slices.items() if any(blind[at])]
+        parts.append(f"The data do not determine {', '.join(unseen)}; no number is given for what they leave free.")
+    if problem.data.sigma is None and int(known.freedom[row]) <= 0:
+        parts.append("There are no more samples than values, so no interval can be given.")
+    if weighed:
+        parts.append("Samples were weighted by 1/sigma^2, so the minimised loss is chi-square.")
+    return " ".join(parts)

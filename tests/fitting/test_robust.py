@@ -1,0 +1,106 @@
+"""Robust forms: their equations, their derivatives, and what they are for."""
+
+import math
+
+import pytest
+import scipy.optimize
+import torch
+from fit_cases import measured_from
+
+import brdfcore as bc
+from brdfcore.fitting.losses import LOSSES
+from brdfcore.fitting.plan import check
+from brdfcore.fitting.problem import Problem
+from brdfcore.fitting.robust import ROBUST, softened
+
+TRUE = "lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.15)"
+MODEL = "lambert + ward_bounded(isotropic)"
+
+
+def spoiled(count: int = 300) -> bc.Samples:
+    """Good samples, of which every tenth reads five times too high."""
+    good = measured_from(TRUE, count=count, noise=0.003)
+    values = good.values.clone()
+    values[::10] *= 5
+    return bc.Samples(good.wi, good.wo, values)
+
+
+@pytest.mark.parametrize("name", ROBUST)
+def test_the_forms_are_scipys(name: str) -> None:
+    z = torch.logspace(-8, 8, 50, dtype=torch.float64)
+    rho, first, second = ROBUST[name].functions(z)
+    expected = {"soft_l1": 2 * (torch.sqrt(1 + z) - 1), "cauchy": torch.log(1 + z)}[name]  # scipy's documentation
+    torch.testing.assert_close(rho, expected, rtol=1e-7, atol=0)
+    leaf = z.clone().requires_grad_()
+    (slope,) = torch.autograd.grad(ROBUST[name].functions(leaf)[0].sum(), leaf, create_graph=True)
+    (bend,) = torch.autograd.grad(slope.sum(), leaf)
+    torch.testing.assert_close(torch.stack([first, second]), torch.stack([slope.detach(), bend]), rtol=1e-7, atol=0)
+
+
+@pytest.mark.parametrize("name", ROBUST)
+def test_gauss_newton_sees_the_gradient_of_rho(name: str) -> None:
+    r = torch.linspace(-5, 5, 41, dtype=torch.float64, requires_grad=True)
+    scale = torch.tensor(0.7, dtype=torch.float64)
+    rho, residual, root = softened(ROBUST[name], scale, r)
+    (slope,) = torch.autograd.grad(rho.sum(), r)
+    torch.testing.assert_close(2 * residual * root, slope)
+
+
+@pytest.mark.parametrize("name", ROBUST)
+def test_normal_noise_costs_a_twentieth_of_the_precision(name: str) -> None:
+    """(E psi')^2 / E psi^2 under a normal distribution, by quadrature: 95 %."""
+    r = torch.linspace(-10, 10, 40001, dtype=torch.float64, requires_grad=True)
+    rho, _, _ = softened(ROBUST[name], torch.tensor(ROBUST[name].multiple, dtype=torch.float64), r)
+    (psi,) = torch.autograd.grad(0.5 * rho.sum(), r, create_graph=True)
+    slope = torch.autograd.grad(psi.sum(), r)[0].detach()
+    density = torch.exp(-0.5 * r.detach() ** 2) / math.sqrt(2 * math.pi) * 20 / 40000
+    assert float((slope * density).sum() ** 2 / (psi.detach() ** 2 * density).sum()) == pytest.approx(0.95, abs=1e-4)
+
+
+@pytest.mark.parametrize("loss", bc.LOSSES)
+@pytest.mark.parametrize("name", ROBUST)
+def test_a_few_bad_samples_do_not_decide(name: str, loss: str) -> None:
+    samples = spoiled()
+    true = {key: value.detach() for key, value in bc.material(TRUE).values().items()}
+    plain, robust = bc.fit(samples, MODEL, loss=loss), bc.fit(samples, MODEL, loss=loss, robust=name)
+    assert robust.status == "converged"
+
+    def off(fit: bc.Fit) -> float:
+        return max(float((fit.parameters[key] / value - 1).abs()) for key, value in true.items())
+
+    # bad samples that all err upwards still pull with a force that does not fall, soft_l1, or that does, cauchy
+    assert off(robust) < {"soft_l1": 0.1, "cauchy": 0.03}[name]
+    assert off(robust) < 0.7 * off(plain)
+
+
+@pytest.mark.parametrize("name", ROBUST)
+def test_the_optimum_is_scipys_with_the_same_scale(name: str) -> None:
+    samples, scale = spoiled(), 0.004
+    fit = bc.fit(samples, MODEL, robust=name, robust_scale=scale)
+    plan = check(1, MODEL)
+    problem = Problem(plan, samples, LOSSES["cosine"])
+
+    def residuals(x: object) -> object:
+        f = problem.f(torch.as_tensor(x).unsqueeze(0), problem.data)
+        return problem.residuals(f, problem.data, None)[1].reshape(-1).numpy()
+
+    start = problem.pack(fit.values).numpy() + 0.01
+    best = scipy.optimize.least_squares(residuals, start, loss=name, f_scale=scale, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    assert fit.objective == pytest.approx(2 * best.cost, rel=1e-9)
+    assert fit.errors["cosine"] > fit.objective
+
+
+def test_intervals_of_a_robust_fit_are_those_of_the_good_samples() -> None:
+    samples = spoiled(1000)
+    clean = torch.ones(1000, dtype=torch.bool)
+    clean[::10] = False
+    robust = bc.fit(samples, MODEL, robust="cauchy")
+    plain, good = bc.fit(samples, MODEL), bc.fit(samples.subset(clean), MODEL)
+    for key, error in good.standard_errors.items():
+        assert 0.8 * float(error) < float(robust.standard_errors[key]) < 2 * float(error)
+        assert float(robust.standard_errors[key]) < 0.2 * float(plain.standard_errors[key])
+
+
+def test_exact_data_are_fitted_exactly() -> None:
+    fit = bc.fit(measured_from(TRUE), MODEL, robust="cauchy")
+    assert float(fit.parameters["ward_bounded.a"]) == pytest.approx(0.15, rel=1e-6)
