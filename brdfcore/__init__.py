@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
     from .energy.tables import AlbedoTable, albedo_table
-    from .fitting import LOSSES, OPTIMIZERS, Fit, Progress, fit
+    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, fit, fit_batch
     from .formats import FORMATS, read
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
@@ -36,6 +36,7 @@ __all__ = [
     "OPTIMIZERS",
     "PRESETS",
     "QUANTITIES",
+    "ROBUST",
     "Albedo",
     "AlbedoTable",
     "Certificate",
@@ -53,6 +54,7 @@ __all__ = [
     "energy",
     "errors",
     "fit",
+    "fit_batch",
     "hemispherical_albedo",
     "material",
     "plots",
@@ -65,7 +67,7 @@ _MODULES = {
     ".energy.certificate": ("Certificate", "certify"),
     ".energy.hemispherical": ("hemispherical_albedo",),
     ".energy.tables": ("AlbedoTable", "albedo_table"),
-    ".fitting": ("LOSSES", "OPTIMIZERS", "Fit", "Progress", "fit"),
+    ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "fit", "fit_batch"),
     ".formats": ("FORMATS", "read"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),

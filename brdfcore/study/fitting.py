@@ -16,10 +16,14 @@ from torch import Tensor
 
 from ..fitting import fit
 from ..fitting.adam import adam
+from ..fitting.data import root_weights
 from ..fitting.lbfgs import lbfgs
-from ..fitting.least_squares import Outcome, least_squares
+from ..fitting.least_squares import least_squares
+from ..fitting.levenberg_marquardt import OnStep, Outcome
 from ..fitting.losses import LOSSES
-from ..fitting.problem import root_weights
+from ..fitting.problem import Problem
+from ..fitting.projection import Projection
+from ..fitting.variable_projection import variable_projection
 from ..plots._panels import Curve, Panel
 from ._fit_cases import LINOLEUM, NOISE, TRUE, Case, case, start
 from ._peers import PEERS, Minimise, Residuals
@@ -29,10 +33,22 @@ MERL = 1_100_000  # about what a MERL file holds of valid bins
 SIZES = (LINOLEUM, 10_000, 100_000, MERL)
 REACHED = 1e-6  # of the minimum: far below what noise leaves to tell
 _RESOLVED = 1e-14  # of the minimum: less is rounding
-_OURS: dict[str, Callable[..., Outcome]] = {"least_squares": least_squares, "lbfgs": lbfgs, "adam": adam}
-_WHOLE = "bc.fit (scan and least_squares)"
+_WHOLE = "bc.fit (scan and projection)"
 
 Trace = list[tuple[float, float]]  # seconds since the start, lowest loss so far
+
+
+def _projection(problem: Problem, x: Tensor, on_step: OnStep) -> Outcome:
+    """Variable projection as an optimizer like the others, its plan included."""
+    return variable_projection(Projection(problem), x, on_step=on_step)
+
+
+_OURS: dict[str, Callable[..., Outcome]] = {
+    "variable_projection": _projection,
+    "least_squares": least_squares,
+    "lbfgs": lbfgs,
+    "adam": adam,
+}
 
 
 def fitting(
