@@ -38,7 +38,7 @@ def check(text: str, *, as_json: bool) -> tuple[str, bool]:
         *_albedos(material, whole),
     ]
     for label, says, own in terms:
-        lines += ["", *_row(f"{label}: says", says), *(_row("found", own.verdict) if several else [])]
+        lines += ["", *_row(f"{label} says", says), *(_row("found", own.verdict) if several else [])]
     cost = [whole, *(own for _, _, own in terms if several)]
     seconds, evaluations = sum(own.seconds for own in cost), sum(own.evaluations for own in cost)
     return "\n".join([*lines, "", f"{seconds:.2f} s, {evaluations} evaluations"]), whole.energy_conserving
@@ -83,13 +83,13 @@ def _numbers(it: "Certificate") -> list[str]:
     if math.isfinite(it.max_albedo):
         largest = f"{it.max_albedo:.7g} to within {it.error:.1g}, {it.place}"
     else:
-        largest = "no limit"
+        largest = f"no limit, {it.place}"
     if it.exceeds is None:
         above = "nowhere"
     else:
         first, last = (f"{math.degrees(theta):.7g}" for theta in it.exceeds)
         above = f"from {first} to {last} degrees"
-    grazing = f"like 1/cos^{it.grazing_exponent:.6g} theta" if it.grazing_exponent else f"{it.grazing_limit:.7g}"
+    grazing = f"like 1/{it.power}" if it.grazing_exponent else f"{it.grazing_limit:.7g}"
     rows = {
         "largest albedo": largest,
         "above 1": above,

@@ -1,14 +1,14 @@
 """The axes of a table of albedos, each with a coordinate in which the albedo is smooth.
 
     theta   t = (1 - theta / (pi/2))^(1/3)           even steps of t lie close together towards grazing
-    phi     t = cos 2 phi',  tan phi' = tan phi / stretch,  stretch = sqrt(ay/ax)
+    phi     t = cos 2 phi',  tan phi' = tan phi / stretch,  stretch = sqrt(ax/ay)
     log     t = ln value          where the parameter is one that is searched on a logarithmic scale
     linear  t = value
 
 A lobe's albedo changes with theta where the horizon begins to cut it, at a height of about its width, and with the
-azimuth where a long lobe turns its side. The cube root puts 30 to 60 nodes where they serve widths from 1 to 1e-3, and
-the stretch makes 10 azimuths serve where 50 would be needed. Every model is symmetric about the planes x = 0 and y = 0,
-so one quadrant holds all azimuths (tests/energy/test_tables.py).
+azimuth where a long lobe turns its narrow side. The cube root makes 20 to 60 nodes serve widths from 1 to 1e-3, and the
+stretch 10 azimuths where 50 to 90 would be needed. Every model is symmetric about the planes x = 0 and y = 0, so one
+quadrant holds all azimuths (tests/energy/test_tables.py).
 """
 
 import math
@@ -24,7 +24,7 @@ from ..parameters import Values
 from . import _chebyshev
 
 LOWEST = 1e-12  # the height [rad] at which an axis without an end ends: the albedo there is that of the horizon
-_WIDTH_POWER = {False: 0.5, True: -0.25}  # of the ratio y/x, for widths and for exponents n = 2 / width^2
+_WIDTH_POWER = {False: 0.5, True: -0.25}  # of the ratio x/y, for widths and for exponents n = 2 / width^2
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def ratios(form: Form) -> tuple[Ratio, ...]:
     for term in terms:
         along_x, along_y = (f"{term.label}.{name}" for name in term.model.width_names)  # type: ignore[attr-defined]
         is_exponent = term.model.widths_along[0] == "n"  # type: ignore[attr-defined]
-        found.append(Ratio(along_y, along_x, _WIDTH_POWER[is_exponent] / len(terms)))
+        found.append(Ratio(along_x, along_y, _WIDTH_POWER[is_exponent] / len(terms)))
     return tuple(found)
 
 

@@ -34,6 +34,7 @@ ROUNDS = 4  # of counting again after a check
 CHECKS = (128, 2048)  # fewest and most points between the nodes that are checked
 SAFETY = 2.0  # what is claimed, over the largest difference found
 QUADRATURE = 0.1  # of the tolerance, for each value
+LINES = 0.05  # of an axis's share, for each value on a line: the coefficients of n random errors add up to sqrt(2 n)
 BLOCK = 1024  # rows between two words of progress
 SEED = 20100629
 
@@ -72,6 +73,14 @@ class Quadrature:
             with torch.no_grad():
                 albedo = of_form(self.form, self.fixed | side_by_side | shapes, co, azimuth, tolerance)
             self.evaluations += albedo.evaluations
+            sound = (albedo.values.isfinite() & albedo.error.isfinite()).all(-1)
+            if not bool(sound.all()):
+                at = {name: float(row[~sound][0]) for name, row in block.items()}
+                raise InvalidValueError(
+                    "Expected the albedo to be a finite number all over the table, got none at "
+                    f"{', '.join(f'{name} = {value:.6g}' for name, value in at.items())}. Narrow the axes.",
+                    field="axes",
+                )
             self.worst = max(self.worst, float((albedo.error / albedo.values.clamp(min=1)).max()))
             found.append(albedo.values.expand(-1, many * self.channels))
             if share is not None:
@@ -208,11 +217,11 @@ class _Work:
             if axis.name in self.unread:
                 spread = {name: level.repeat(n) for name, level in levels.items()}
                 spread[axis.name] = here.repeat_interleave(many)
-                found = self.quadrature(rows, spread, QUADRATURE * self.tolerance).unflatten(1, (n, many)).movedim(1, 0)
+                found = self.quadrature(rows, spread, LINES * share).unflatten(1, (n, many)).movedim(1, 0)
             else:
                 spread = {name: row.repeat(n) for name, row in rows.items()}
                 spread[axis.name] = here.repeat_interleave(lines)
-                found = self.quadrature(spread, levels, QUADRATURE * self.tolerance).unflatten(0, (n, lines))
+                found = self.quadrature(spread, levels, LINES * share).unflatten(0, (n, lines))
             return found
 
         n = 3 if axis.name in self.unread else 9

@@ -12,12 +12,13 @@ import torch
 
 from ..errors import InvalidValueError
 from ..models.material import Material
-from .peak import COARSE, exceeding, highest, refined
+from .peak import exceeding, highest, refined
 from .probe import pairs, reciprocity
-from .scan import LOWEST, Scan, lone_terms, theta_of
+from .scan import LOWEST, STEEP, Scan, azimuth_of, lone_terms, theta_of
 
-NEAR = math.acosh(1e8)  # u beyond which a largest value is the limit's
 ROUNDING = 1e-9  # of a reciprocity error: f of narrow lobes has lost as much
+
+ROUGH = 1e-2  # tolerance of the scan; what may be the largest is looked at again
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,11 @@ class Certificate:
         azimuth = "" if self.isotropic else f" and azimuth {math.degrees(self.at_phi):.3g}"
         return f"{where}{azimuth}{channel}"
 
+    @property
+    def power(self) -> str:
+        """The power of the cosine by which the albedo grows towards grazing, where it has no limit."""
+        return "cos theta" if self.grazing_exponent == 1 else f"cos^{self.grazing_exponent:.3g} theta"
+
     def to_dict(self) -> dict[str, Any]:
         """The certificate as JSON-able data, angles in degrees, null for what is infinite."""
         return {
@@ -117,9 +123,8 @@ def certify(material: Material, tolerance: float = 1e-6) -> Certificate:
     with torch.no_grad():
         values = {key: value.detach().double().cpu() for key, value in material.values().items()}
         scan = Scan(lone_terms(material.form, values), material.channels)
-        last, errors = scan.albedos(scan.u[-2:], scan.s, tolerance)
-        total = torch.cat([scan.albedos(scan.u[:-2], scan.s, COARSE)[0], last], dim=1).sum(0)
-        exponents = scan.exponents(last, errors)
+        total, claimed = (part.sum(0) for part in scan.rows(scan.u, ROUGH))
+        exponents = scan.exponents()
         if bool((exponents > 0).any()):
             fastest = torch.where((exponents == exponents.max()).any(0), total[-1:], -1.0)
             top = highest(scan, total)
@@ -128,18 +133,16 @@ def certify(material: Material, tolerance: float = 1e-6) -> Certificate:
             top = highest(scan, total)._replace(error=0.0)
             limit = highest(scan, total[-1:])
         else:
-            top, limit = refined(scan, total, tolerance)
-            limit = limit._replace(error=limit.error + float((total[-1] - total[-2]).abs().max()))
-        at_limit = limit.albedo > top.albedo + top.error or (
-            top.u > NEAR and limit.albedo >= top.albedo - top.error - limit.error
-        )
+            top, limit = refined(scan, total, claimed, tolerance)
+        doubt = top.error if top.u < STEEP else -tolerance  # what is as good as at the horizon is the limit's
+        at_limit = math.isinf(limit.albedo) or limit.albedo > top.albedo + doubt
         found = limit if at_limit else top
         exceeds = exceeding(scan, total, top, tolerance) if found.albedo > 1 + tolerance else None
         exchanged, smallest = reciprocity(material.form, values)
     return Certificate(
         max_albedo=found.albedo,
         at_theta=math.pi / 2 if at_limit else theta_of(found.u),
-        at_phi=found.phi,
+        at_phi=float(azimuth_of(torch.tensor(found.s))),
         channel=found.channel,
         error=found.error,
         grazing_limit=limit.albedo,
@@ -172,8 +175,7 @@ def _energy(it: Certificate) -> str:
     if it.grazing_exponent == 0:
         largest = f"{it.max_albedo:.4g}, {it.place}" if math.isfinite(it.max_albedo) else "more than 1e308"
         return f"Reflects more than it receives {_range(*it.exceeds)}: the largest albedo is {largest}."
-    power = "cos theta" if it.grazing_exponent == 1 else f"cos^{it.grazing_exponent:.3g} theta"
-    grows = f"the albedo grows like 1/{power} and has no limit"
+    grows = f"the albedo grows like 1/{it.power} and has no limit"
     if it.exceeds[0] < math.pi / 2:
         return f"Reflects more than it receives {_range(*it.exceeds)}: {grows}."
     return (

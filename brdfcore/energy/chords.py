@@ -35,12 +35,15 @@ GRADE = 8.0  # the grading's scale by that at which the horizon's edge shows
 class Chords(Integral):
     """The integral for a `ward_bounded`."""
 
-    pilot = (LADDER.index(8), LADDER.index(12))
     last = (len(LADDER) - 1, LADDER.index(1024))
 
     def __init__(self, model: Model, place: Values, rows: Rows, error: float) -> None:
         super().__init__(model, place, rows, error)
         self.pieces = 4 if anisotropic(model) else 1  # into which the interval is parted
+
+    def guess(self, digits: float) -> tuple[float, float]:
+        """About the sizes that leave an error of 10^-digits."""
+        return 1.0, 4 * digits if self.pieces == 1 else 2.5 * digits
 
     def count(self, outer: int, inner: int) -> int:
         """The number of chords that a row takes."""
@@ -129,9 +132,7 @@ def _level(d: Tensor) -> Tensor:
         series = (-1) ** k * 4 / (math.factorial(k) * (2 * k + 1) * (2 * k + 3)) + x * series
     d = torch.where(flat, 1.0, d)
     d2 = d.square()
-    return torch.where(
-        flat, series, ((d2 - 0.5) * (math.sqrt(math.pi) / d) * torch.erf(d) + torch.exp(-d2)) / d2
-    )
+    return torch.where(flat, series, ((d2 - 0.5) * (math.sqrt(math.pi) / d) * torch.erf(d) + torch.exp(-d2)) / d2)
 
 
 def _kernel(c: Tensor, d: Tensor) -> Tensor:

@@ -3,6 +3,7 @@
 lambert: 1. ashikhmin_shirley_diffuse: 1 - (1 - co/2)^5 (techreport eqs. 12, 15). oren_nayar, qualitative:
 A + B/pi (s (theta - s c) + 2/3 tan theta (1 - s^3)) with s = sin theta_o, c = cos theta_o; energy-preserving: E for the
 first reflection and 1 - E for the others (Portsmouth, Kutz and Hill 2025, with Oren and Nayar's A and B 1994).
+What a compensated microfacet lobe returns: F_back G(co) (Kulla and Conty 2017).
 """
 
 import math
@@ -12,9 +13,15 @@ import torch
 from torch import Tensor
 
 from ..models import Model
+from ..models._compensation import MEAN_ERROR, rise
+from ..models._smith import SmithLobe
 from ..models.fresnel import one_minus_fifth_power
 from ..models.oren_nayar import _C1, _lost
 from ..parameters import Values
+from .rules import gauss
+
+PANELS = 768  # of the quadrature of a spline's mean
+MEAN_PRECISE = 1e-11  # of that mean, as a share of it
 
 Exact = Callable[[Model, Values, Tensor], tuple[Tensor, ...]]
 
@@ -46,3 +53,22 @@ EXACT: dict[str, Exact] = {
     "ashikhmin_shirley_diffuse": _ashikhmin_shirley_diffuse,
     "oren_nayar": _oren_nayar,
 }
+
+
+def returned(model: SmithLobe, own: Values, co: Tensor, tolerance: float) -> tuple[Tensor, float]:
+    """What a compensated lobe returns for ks = 1 [1], and the share of it that may be wrong.
+
+    F_back G(co), times 2 integral of G mu dmu / Gbar: Gbar is a quadrature in the lobe's own formula. For tolerances
+    that it meets the quotient counts as 1.
+    """
+    whole = model.returned_albedo(own, co)
+    if tolerance > MEAN_ERROR:
+        return whole, MEAN_ERROR
+    a = own["a"].double()
+    rule = gauss(6).to(co.device)
+    x = ((torch.arange(PANELS, device=co.device)[:, None] + rule.nodes) / PANELS).flatten()
+    scale = rise(a).unsqueeze(-1)
+    length = torch.log1p(1 / scale)
+    mu = scale * torch.expm1(x * length)
+    mean = (model.lost(mu, a.unsqueeze(-1)) * (rule.weights.repeat(PANELS) * length * mu * (mu + scale))).sum(-1)
+    return whole * (2 / PANELS * mean / model.mean_lost(a)), MEAN_PRECISE

@@ -8,7 +8,7 @@ horizon begins to cut the lobe. T d.u = tau cos(t - t1), so that the angles of n
 
 with w equally spaced: T d.u = kappa sinh(Y cos w) goes through every order of magnitude from kappa to tau. The map is
 analytic and periodic, and the identity for Y = 0. A long and narrow lobe has a second such place, its narrow axis: then
-two maps follow each other.
+two maps follow each other. A lobe with kinks is integrated over pieces of the circle on which it is smooth.
 """
 
 import math
@@ -18,10 +18,12 @@ import torch
 from torch import Tensor
 
 from .lobes import Profile
+from .refinement import Rows
 from .rules import Rule, gauss, ring
 
-HORIZON = 0.1  # T d.u at which the horizon is still beyond exp(-25) of a Gaussian lobe, and at 0.3 beyond exp(-2.8)
-ALGEBRAIC_HORIZON = 0.01
+HORIZON = 0.1  # T d.u at which the horizon is still beyond exp(-25) of a Gaussian lobe; at 0.3 beyond exp(-2.8)
+ALGEBRAIC_HORIZON = 0.01  # the same for a lobe whose tail is longer
+NEGLIGIBLE_LAYER = 100  # times the error that may be neglected
 IDENTITY = 1e-9  # a Y for which the map is the identity to rounding
 
 
@@ -32,7 +34,7 @@ class Rays(NamedTuple):
     y: Tensor
     s: Tensor  # T cos phi, phi the azimuth against wo's
     width: Tensor  # of the lobe along the ray [1]
-    weight: Tensor  # d phi
+    weight: Tensor  # d phi, and of the rule
     rule: Rule
     panels: int  # the rule is applied to so many pieces of the circle
 
@@ -40,10 +42,8 @@ class Rays(NamedTuple):
 def graded(w: Tensor, y: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Cosine and sine of the angle D with cos D = sinh(y cos w) / sinh y, and dD/dw; nothing cancels."""
     inner = y * torch.cos(w)
-    root = torch.sqrt(
-        _sinh_ratio(2 * y * torch.sin(w / 2).square()) * _sinh_ratio(2 * y * torch.cos(w / 2).square())
-    )
-    return torch.sinh(inner) / torch.sinh(y), torch.sin(w) / _sinh_ratio(y) * root, torch.cosh(inner) / root
+    root = torch.sqrt(_sinh_ratio(2 * y * torch.sin(w / 2).square()) * _sinh_ratio(2 * y * torch.cos(w / 2).square()))
+    return torch.sinh(inner) / torch.sinh(y), torch.sin(w) * (root / _sinh_ratio(y)), torch.cosh(inner) / root
 
 
 def _sinh_ratio(x: Tensor) -> Tensor:
@@ -53,100 +53,100 @@ def _sinh_ratio(x: Tensor) -> Tensor:
 
 
 class Circle:
-    """The maps from w to t for each row (R, 1)."""
+    """The circle of rays for each row, for a lobe of the given widths (R, 1) or (1, 1); `two`, if they differ.
 
-    def __init__(self, profile: Profile, tangent: Tensor, toward: Tensor, widths: tuple[Tensor, Tensor], two: bool):
-        wx, wy = widths
-        self.wx, self.wy = wx, wy
+    Kinks count where they matter more than `error` of the whole.
+    """
+
+    def __init__(self, profile: Profile, rows: Rows, widths: tuple[Tensor, Tensor], two: bool, error: float) -> None:
+        self.profile, self.two = profile, two
+        co, toward = rows.co[:, None], rows.azimuth[:, None]
+        self.tangent = torch.sqrt((1 - co) * (1 + co)) / co
+        self.wx, self.wy = (width.expand_as(co) for width in widths)
         cosine, sine = torch.cos(toward), torch.sin(toward)
-        reach = torch.sqrt((wx * cosine).square() + (wy * sine).square())  # of the lobe towards wo
-        self.tau = tangent * reach
-        self.across = wx * wy / reach  # the lobe's width where T d.u is 0
-        self.cos1, self.sin1 = wx * cosine / reach, wy * sine / reach
-        self.two = two
-        self.stretch = torch.ones_like(self.tau)
+        reach = torch.sqrt((self.wx * cosine).square() + (self.wy * sine).square())  # of the lobe towards wo
+        self.tau = self.tangent * reach
+        self.cos1, self.sin1 = self.wx * cosine / reach, self.wy * sine / reach
+        stretch = torch.ones_like(self.tau)
         if two:
-            self._narrow_axis(profile)
+            stretch = self._set_narrow_axis()
+        across = self.wx * self.wy / reach  # the lobe's width where T d.u is 0
+        kappa = across.clamp(min=ALGEBRAIC_HORIZON if profile.fall == "algebraic" else HORIZON)
+        self.steepness = self.fine = torch.asinh(self.tau * stretch / kappa).clamp(min=IDENTITY)
+        if profile.kink == "equal":
+            # The kink is within the lobe where T d.u is below the square of its width, a strip as narrow as that; there
+            # the lobe differs by that square from what it would be without.
+            layer = across.square()
+            kept = layer.square() > NEGLIGIBLE_LAYER * error * self.tau
+            finest = torch.where(kept, torch.minimum(kappa, layer), kappa)
+            self.fine = torch.asinh(self.tau * stretch / finest).clamp(min=IDENTITY)
 
-    def _narrow_axis(self, profile: Profile) -> None:
-        """Set the first map, which is dense at the narrow axis, and where T d.u = 0 lies in it."""
+    def _set_narrow_axis(self) -> Tensor:
+        """Set the first map, which is dense at the narrow axis, and return its slope where T d.u = 0."""
         narrow, wide = torch.minimum(self.wx, self.wy), torch.maximum(self.wx, self.wy)
         ratio, beyond = narrow / wide, 1 / wide.clamp(min=1.0)
-        if profile.fall == "algebraic":
+        if self.profile.fall == "algebraic":
             scale = ratio * beyond
-        elif profile.kink != "none":
+        elif self.profile.kink != "none":
             scale = ratio
+        elif self.profile.smith:
+            scale = torch.where(beyond < 1, ratio * beyond, 1.0)
         else:
-            scale = torch.where(beyond < 1, ratio * beyond, 1.0) if profile.smith else torch.maximum(ratio, beyond)
-        self.y1 = torch.where(scale < 1, torch.asinh(1 / scale), IDENTITY).expand_as(self.tau)
-        self.swap = self.wx > self.wy  # the first map's own axis is y where the narrow one is x
-        # u is the angle before the first map; T d.u = 0 at the angle t1 + pi/2
-        cosine, sine = torch.where(self.swap, -self.sin1, self.cos1), torch.where(self.swap, self.cos1, self.sin1)
-        level = torch.acos((torch.asinh(cosine * torch.sinh(self.y1)) / self.y1).clamp(-1, 1))
-        level = torch.where(sine < 0, -level, level)
-        self.stretch = graded(level, self.y1)[2]
-        self.u1 = level - math.pi / 2
+            scale = torch.maximum(ratio, beyond)
+        self.first = torch.where(scale < 1, torch.asinh(1 / scale), IDENTITY)
+        self.swapped = self.wx > self.wy
+        # the angle u before the first map at which T d.u = 0, that is t = t1 + pi/2
+        cosine = torch.where(self.swapped, -self.sin1, self.cos1)
+        level = torch.acos((torch.asinh(cosine * torch.sinh(self.first)) / self.first).clamp(-1, 1))
+        level = torch.where(torch.where(self.swapped, self.cos1, self.sin1) < 0, -level, level)
+        self.start = level - math.pi / 2
+        return graded(level, self.first)[2]
 
-    def steepness(self, kappa: Tensor) -> Tensor:
-        """Y of the map whose smallest scale in T d.u is kappa."""
-        return torch.asinh(self.tau * self.stretch / kappa).clamp(min=IDENTITY)
-
-    def at(self, w: Tensor, steepness: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """cos t, sin t, cos(t - t1) and dt/dw."""
+    def at(self, chosen: Tensor, w: Tensor, steepness: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Cos t, sin t, cos(t - t1) and dt/dw of the chosen rows."""
         cosine, sine, slope = graded(w, steepness)
+        cos1, sin1 = self.cos1[chosen], self.sin1[chosen]
         if not self.two:
-            return cosine * self.cos1 - sine * self.sin1, cosine * self.sin1 + sine * self.cos1, cosine, slope
-        u = self.u1 + torch.atan2(sine, cosine)
-        cosine, sine, first = graded(u, self.y1)
-        cosine, sine = torch.where(self.swap, cosine, -sine), torch.where(self.swap, sine, cosine)
-        return cosine, sine, cosine * self.cos1 + sine * self.sin1, slope * first
+            return cosine * cos1 - sine * sin1, cosine * sin1 + sine * cos1, cosine, slope
+        cosine, sine, further = graded(self.start[chosen] + torch.atan2(sine, cosine), self.first[chosen])
+        swapped = self.swapped[chosen]
+        cosine, sine = torch.where(swapped, cosine, -sine), torch.where(swapped, sine, cosine)
+        return cosine, sine, cosine * cos1 + sine * sin1, slope * further
 
+    def rays(self, chosen: Tensor, size: int) -> Rays:
+        """The rays of the chosen rows.
 
-def rays(
-    profile: Profile, co: Tensor, toward: Tensor, widths: tuple[Tensor, Tensor], two: bool, size: int, error: float
-) -> Rays:
-    """The rays for wo of cosine co and azimuth `toward`, (R,); `error` is what the lobe's kinks may be neglected for.
+        A smooth lobe has 2 `size` rays round the circle, of which those of an isotropic one stand for their mirror
+        images; one with kinks has `size` rays on each piece of it.
+        """
+        if self.profile.kink == "none":
+            rule, panels = ring(2 * size, mirrored=not self.two).to(self.tau.device), 1
+            cos_t, sin_t, from_wo, slope = self.at(chosen, rule.nodes, self.steepness[chosen])
+            weight = slope * rule.weights
+        else:
+            rule = gauss(size).to(self.tau.device)
+            pieces = []
+            for low, high, steepness in self._pieces(chosen):
+                *at, slope = self.at(chosen, low + (high - low) * rule.nodes, steepness)
+                pieces.append((*at, slope * (high - low) * rule.weights * (1 if self.two else 2)))
+            panels = len(pieces)
+            cos_t, sin_t, from_wo, weight = (torch.cat(v, 1) for v in zip(*pieces, strict=True))
+        wx, wy = self.wx[chosen], self.wy[chosen]
+        x, y = wx * cos_t, wy * sin_t
+        norm2 = x.square() + y.square()
+        over = torch.rsqrt(norm2)
+        x, y = x * over, y * over
+        width = torch.rsqrt((x / wx).square() + (y / wy).square()) if self.two else wx.expand_as(x)
+        return Rays(x, y, self.tau[chosen] * from_wo * over, width, weight * (wx * wy) / norm2, rule, panels)
 
-    Isotropic, `two` widths being the same, rays stand for their mirror images. A smooth lobe has 2 `size` rays round
-    the circle, one with kinks `size` rays on each piece of it.
-    """
-    tangent = (torch.sqrt((1 - co) * (1 + co)) / co)[:, None]
-    circle = Circle(profile, tangent, toward[:, None], widths, two)
-    kappa = circle.across.clamp(min=ALGEBRAIC_HORIZON if profile.fall == "algebraic" else HORIZON)
-    y = circle.steepness(kappa)
-    if profile.kink == "none":
-        rule = ring(2 * size, mirrored=not two).to(co.device)
-        panels, (cos_t, sin_t, cos_from_wo, slope) = 1, circle.at(rule.nodes, y)
-        weight = slope * rule.weights
-    else:
-        rule = gauss(size).to(co.device)
-        pieces = []
-        for low, high, steepness in _pieces(profile, circle, tangent, y, kappa, error):
-            *at, slope = circle.at(low + (high - low) * rule.nodes, steepness)
-            pieces.append((*at, slope * (high - low) * rule.weights * (1 if two else 2)))
-        panels, (cos_t, sin_t, cos_from_wo, weight) = len(pieces), (torch.cat(v, 1) for v in zip(*pieces, strict=True))
-    wx, wy = widths
-    x, y = wx * cos_t, wy * sin_t
-    norm2 = x.square() + y.square()
-    norm = torch.sqrt(norm2)
-    x, y = x / norm, y / norm
-    width = torch.rsqrt((x / wx).square() + (y / wy).square())
-    return Rays(x, y, circle.tau * cos_from_wo / norm, width, weight * wx * wy / norm2, rule, panels)
-
-
-def _pieces(
-    profile: Profile, circle: Circle, tangent: Tensor, y: Tensor, kappa: Tensor, error: float
-) -> list[tuple[Tensor, Tensor, Tensor]]:
-    """The pieces of the circle on which a lobe with kinks is smooth: both ends (R, 1) and the map's Y."""
-    start, quarter = torch.zeros_like(y), torch.full_like(y, math.pi / 2)
-    if profile.kink == "grooves":  # the kinks change places where T cos phi = 1
-        split = torch.acos((torch.asinh(torch.sinh(y) / tangent.clamp(min=1.0)) / y).clamp(max=1.0))
-        return [(start, split, y), (split, 2 * quarter, y)]
-    # The kink is within the lobe where T d.u is below the square of its width: a strip of the width's fourth power
-    layer = circle.across.square()
-    needed = layer.square() > 0.01 * error * circle.tau.clamp(min=IDENTITY)
-    fine = circle.steepness(torch.where(needed, torch.minimum(kappa, layer), kappa))
-    pieces = [(start, quarter, fine), (quarter, 2 * quarter, y)]
-    if circle.two:
-        pieces += [(2 * quarter, 3 * quarter, y), (3 * quarter, 4 * quarter, fine)]
-    return pieces
+    def _pieces(self, chosen: Tensor) -> list[tuple[Tensor | float, Tensor | float, Tensor]]:
+        """The pieces of the circle on which a lobe with kinks is smooth: both ends and the map's Y."""
+        y, fine, quarter = self.steepness[chosen], self.fine[chosen], math.pi / 2
+        if self.profile.kink == "grooves":  # the kinks change places where T cos phi = 1
+            level = torch.asinh(torch.sinh(y) / self.tangent[chosen].clamp(min=1.0)) / y
+            split = torch.acos(level.clamp(max=1.0))
+            return [(0.0, split, y), (split, 2 * quarter, y)]
+        pieces: list[tuple[Tensor | float, Tensor | float, Tensor]] = [(0.0, quarter, fine), (quarter, 2 * quarter, y)]
+        if self.two:
+            pieces += [(2 * quarter, 3 * quarter, y), (3 * quarter, 4 * quarter, fine)]
+        return pieces

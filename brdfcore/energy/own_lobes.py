@@ -22,7 +22,7 @@ from torch import Tensor
 
 from ..models import Model
 from ..parameters import Values
-from .grading import HORIZON, Circle
+from .grading import Circle
 from .lobes import Profile
 from .refinement import NODES, Integral, Rows, Sums, take
 from .rules import LADDER, gauss
@@ -36,8 +36,11 @@ LARGEST = 690.0  # of log |r|^n: beyond it the lobe's own numbers overflow, and 
 class PowerCosine(Integral):
     """The integral for a `lafortune`."""
 
-    pilot = (LADDER.index(8), LADDER.index(10))
     last = (len(LADDER) - 1, LADDER.index(512))
+
+    def guess(self, digits: float) -> tuple[float, float]:
+        """About the sizes that leave an error of 10^-digits."""
+        return 1.0, 2 * digits
 
     def count(self, outer: int, inner: int) -> int:
         """The number of nodes that a row takes."""
@@ -47,9 +50,7 @@ class PowerCosine(Integral):
         """The integral for the chosen rows and values (R or 1, 1), which may be differentiated."""
         co, toward = (v[:, None] for v in self.rows.take(chosen))
         own, place, rule = take(own, chosen), take(self.place, chosen), gauss(inner).to(co.device)
-        x2, y2 = (
-            (torch.sqrt((1 - co) * (1 + co)) * turn(toward)).square() for turn in (torch.cos, torch.sin)
-        )
+        x2, y2 = ((torch.sqrt((1 - co) * (1 + co)) * turn(toward)).square() for turn in (torch.cos, torch.sin))
         with torch.no_grad():
             c = co / torch.sqrt(co.square() + place["cx"].square() * x2 + place["cy"].square() * y2)
             end = torch.sqrt(torch.expm1((-math.log(self.error) / (0.5 * place["n"] + 0.5)).clamp(max=60.0)))
@@ -81,7 +82,6 @@ class PowerCosine(Integral):
 class Lump(Integral):
     """The integral for an `edwards`."""
 
-    pilot = (LADDER.index(8), LADDER.index(10))
     last = (len(LADDER) - 1, LADDER.index(1024))
 
     def __init__(self, model: Model, place: Values, rows: Rows, error: float) -> None:
@@ -90,6 +90,10 @@ class Lump(Integral):
         with torch.no_grad():
             ends = [_Rim(take(self.place, part), rows.take(part)).arcs() for part in everything]
         self.start, self.end = (torch.cat(v) for v in zip(*ends, strict=True))
+
+    def guess(self, digits: float) -> tuple[float, float]:
+        """About the sizes that leave an error of 10^-digits."""
+        return 1.0, 2.5 * digits
 
     def count(self, outer: int, inner: int) -> int:
         """The number of rays that a row takes."""
@@ -118,22 +122,18 @@ class Lump(Integral):
 
 
 class _Rim:
-    """The circle about (sin theta_o, 0) on the viewer's disk, seen from the lump's centre, for the angles w of grading.py."""
+    """The circle about (sin theta_o, 0) on the viewer's disk, seen from the lump's centre at grading.py's angles w."""
 
     def __init__(self, own: Values, rows: Rows) -> None:
-        self.co = rows.co[:, None]
-        tangent = torch.sqrt((1 - self.co) * (1 + self.co)) / self.co
-        self.rx, self.ry = own["rx"], own["ry"]
+        self.co, self.rx, self.ry = rows.co[:, None], own["rx"], own["ry"]
         width = self.co * torch.sqrt(own["n"])
-        widths = self.rx / width, self.ry / width
-        self.wx, self.wy = widths
-        self.circle = Circle(Profile("gaussian"), tangent, rows.azimuth[:, None], widths, True)
-        self.steepness = self.circle.steepness(self.circle.across.clamp(min=HORIZON))
+        self.circle = Circle(Profile("gaussian"), rows, (self.rx / width, self.ry / width), True, 0.0)
+        self.everyone = torch.arange(len(rows.co), device=rows.co.device)
 
     def at(self, w: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """The ray's direction on the disk, its length to the rim, and dt/dw."""
-        cosine, sine, from_wo, slope = self.circle.at(w, self.steepness)
-        x, y = self.wx * cosine, self.wy * sine
+        cosine, sine, from_wo, slope = self.circle.at(self.everyone, w, self.circle.steepness)
+        x, y = self.circle.wx * cosine, self.circle.wy * sine
         norm = torch.hypot(x, y)
         s = self.circle.tau * from_wo / norm
         hypotenuse = torch.sqrt(1 + s.square())

@@ -1,7 +1,8 @@
 """Integrals refined until the error that can be claimed for them is small enough, many at a time.
 
-A pilot's spectra say how many nodes each integral will take (rules.py). There, three rules follow each other on the
-ladder, with differences D (the last) and D' (the one before). The error claimed of the finest is
+Three rules follow each other on the ladder of sizes, with differences D (the last) and D' (the one before): first where
+the integral's own guess puts them, then where the spectra foretell the error that is wanted (rules.py). The error
+claimed of the finest is
 
     SAFETY max(D / (1 - D/D'), BEFORE D', HIDDEN times the end of its spectra) + roundings + what lies out of reach
 
@@ -10,12 +11,14 @@ from one difference. Over random materials, angles and tolerances it is above th
 the median at most 100 times as large (tests/energy/test_albedo_claims.py).
 """
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.utils.checkpoint import checkpoint
 
 from ..models import Model
 from ..parameters import Values
@@ -27,7 +30,8 @@ MARGIN = 10.0  # by which a spectrum should have fallen below what is wanted
 LEAP = 4  # steps of the ladder, twice the size: spectra foretell no more
 ROUNDS = 40
 NODES = 2**14  # at a time: a few quantities of so many nodes stay in the processor's cache
-OVERHEAD = 40_000  # nodes that could have been evaluated in the time that one more call takes
+REMEMBERED = 2**19  # nodes whose intermediate results are kept for a derivative
+OVERHEAD = 20_000  # nodes that could have been evaluated in the time that one more call takes
 
 
 class Rows(NamedTuple):
@@ -52,30 +56,65 @@ class Sums(NamedTuple):
 
 
 class Integral(ABC):
-    """The bases of a model, integrated for some directions wo by a rule of two sizes, with nodes placed for some values.
+    """The bases of a model, integrated for some directions wo by a rule of two sizes, its nodes placed for some values.
 
     `error` is about the share of an integral that may be neglected.
     """
 
-    pilot: tuple[int, int]  # the steps of the ladder to begin with, at least 2
-    last: tuple[int, int]  # and those not to go beyond
+    last: tuple[int, int]  # the steps of the ladder not to go beyond
 
     def __init__(self, model: Model, place: Values, rows: Rows, error: float) -> None:
         self.model, self.rows, self.error = model, rows, error
         self.place = {name: value.detach() for name, value in place.items()}
+        self.groups: list[tuple[Tensor, tuple[int, int]]] = []
 
     @abstractmethod
     def sums(self, own: Values, chosen: Tensor, outer: int, inner: int) -> Sums:
         """The integrals of the chosen rows for values (R or 1, 1 or C), which may be differentiated."""
 
     @abstractmethod
+    def guess(self, digits: float) -> tuple[Tensor | float, Tensor | float]:
+        """About the sizes, numbers or (R,), that leave an error of 10^-digits."""
+
+    @abstractmethod
     def count(self, outer: int, inner: int) -> int:
         """The number of nodes that a row takes."""
 
-    def parts(self, own: Values, chosen: Tensor, steps: tuple[int, int]) -> list[Sums]:
-        """The sums of the chosen rows, in parts of a bounded number of nodes."""
+    def solve(self, weights: Tensor, tolerance: float) -> "Refined":
+        """The integrals to the tolerance, as `refined` has it; the sizes that it takes are remembered for `bases`."""
+        found = refined(self, weights, tolerance)
+        sizes, which = torch.unique(found.steps, dim=0, return_inverse=True)
+        self.groups = [(torch.nonzero(which == k)[:, 0], (int(a), int(b))) for k, (a, b) in enumerate(sizes.tolist())]
+        return found
+
+    def bases(self, own: Values) -> Tensor:
+        """The integrals (R, K, 1 or C) at the sizes that `solve` found, for values that may be differentiated.
+
+        Where there are many nodes, a derivative evaluates them again instead of keeping what it needs of each.
+        """
+        nodes = sum(len(rows) * self.count(LADDER[a], LADDER[b]) for rows, (a, b) in self.groups)
+        parts, order = [], []
+        for rows, steps in self.groups:
+            for chunk, sizes in self._chunks(rows, steps):
+                if nodes > REMEMBERED:
+                    parts.append(checkpoint(self._bases, own, chunk, *sizes, use_reentrant=False))
+                else:
+                    parts.append(self._bases(own, chunk, *sizes))
+            order.append(rows)
+        return torch.cat(parts)[torch.argsort(torch.cat(order))]
+
+    def _bases(self, own: Values, chosen: Tensor, outer: int, inner: int) -> Tensor:
+        return self.sums(own, chosen, outer, inner).bases
+
+    def _chunks(self, chosen: Tensor, steps: tuple[int, int]) -> list[tuple[Tensor, tuple[int, int]]]:
+        """The chosen rows in parts of a bounded number of nodes, with the sizes of the rule."""
         sizes = LADDER[steps[0]], LADDER[steps[1]]
-        return [self.sums(own, part, *sizes) for part in chosen.split(max(1, NODES // self.count(*sizes)))]
+        return [(part, sizes) for part in chosen.split(max(1, NODES // self.count(*sizes)))]
+
+    def parts(self, own: Values, chosen: Tensor, steps: tuple[int, int]) -> list[Sums]:
+        """The sums of the chosen rows, without derivatives, in parts of a bounded number of nodes."""
+        with torch.no_grad():
+            return [self.sums(own, part, *sizes) for part, sizes in self._chunks(chosen, steps)]
 
 
 def take(own: Values, rows: Tensor) -> dict[str, Tensor]:
@@ -117,15 +156,18 @@ class _Search:
         self.last = torch.tensor(integral.last, device=device)
         self.open = torch.arange(count, device=device)
         self.evaluations = 0
-        first = self._evaluate(self.open, integral.pilot)
-        steps = torch.tensor(integral.pilot, device=device).expand(count, 2).clone()
-        self.found = Refined(first.bases, torch.full_like(first.bases, torch.inf), steps, self.evaluations)
-        self.target = self._wanted(first, self.open, steps)
+        guessed = integral.guess(-math.log10(tolerance / MARGIN))
+        sizes = [torch.as_tensor(size, dtype=torch.float64, device=device).expand(count) for size in guessed]
+        target = torch.searchsorted(self.ladder, torch.stack(sizes, 1)) + 1
+        self.target = torch.minimum(target.clamp(min=2), self.last)
+        unknown = weights.new_empty(0)
+        self.found = Refined(unknown, unknown, torch.full((count, 2), -1, device=device), 0)
 
     def round(self) -> None:
         """Evaluate every open row at its target, or on the way to it; what meets the tolerance is closed."""
         rows = self.open
-        target = torch.minimum(self.target, self.found.steps[rows] + LEAP)
+        known = self.found.steps[rows]
+        target = torch.where(known < 0, self.target, torch.minimum(self.target, known + LEAP))
         on_the_way = (target < self.target).any(1)
         further = [self._scout(*group) for group in self._groups(rows[on_the_way], target[on_the_way])]
         further += [self._judge(*group) for group in self._groups(rows[~on_the_way], target[~on_the_way])]
@@ -152,6 +194,9 @@ class _Search:
         return rows[~done], self._wanted(sums, rows, self.found.steps[rows])[~done]
 
     def _keep(self, rows: Tensor, steps: tuple[int, int], sums: Sums) -> None:
+        if not self.found.bases.numel():
+            shape = (len(self.found.steps), *sums.bases.shape[1:])
+            self.found.bases, self.found.error = sums.bases.new_zeros(shape), sums.bases.new_full(shape, torch.inf)
         self.found.bases[rows] = sums.bases
         self.found.steps[rows] = torch.tensor(steps, device=rows.device)
 
@@ -231,5 +276,6 @@ class _Search:
                 joint = (max(steps[0], theirs[0]), max(steps[1], theirs[1]))
                 groups[best] = (joint, already + many, [*members, index])
         return [
-            (rows[torch.isin(inverse, torch.tensor(members, device=rows.device))], steps) for steps, _, members in groups
+            (rows[torch.isin(inverse, torch.tensor(members, device=rows.device))], steps)
+            for steps, _, members in groups
         ]

@@ -31,7 +31,8 @@ class Rule(NamedTuple):
 
     def to(self, device: torch.device) -> "Rule":
         """The rule on a device."""
-        return Rule(*(v.to(device) for v in self[:4]), self.alias, self.paired)
+        nodes, rest, weights, modes = (v.to(device) for v in (self.nodes, self.rest, self.weights, self.modes))
+        return Rule(nodes, rest, weights, modes, self.alias, self.paired)
 
     def tail(self, parts: Tensor) -> "Tail":
         """What is left at the end of the spectrum of weighted values (..., n, C), (..., C)."""
@@ -71,7 +72,8 @@ def gauss(n: int) -> Rule:
     p = _legendre(x, n)
     weights = (1 - x * x) / (n * p[n - 1]) ** 2
     modes = np.stack(p[:n], axis=1) * (2 * np.arange(n) + 1)
-    return Rule(*(torch.tensor(v.astype(float)) for v in ((1 + x) / 2, (1 - x) / 2, weights, modes)), alias=2 * n)
+    nodes, rest, shares, spectrum = (torch.tensor(v.astype(float)) for v in ((1 + x) / 2, (1 - x) / 2, weights, modes))
+    return Rule(nodes, rest, shares, spectrum, alias=2 * n)
 
 
 def _legendre(x: np.ndarray, n: int) -> list[np.ndarray]:

@@ -20,10 +20,11 @@ from .albedo import of_form
 from .probe import Symmetry, growth, symmetry
 
 LOW, LOWEST = 1e-10, 1e-12  # the cosines of the last two rows, which tell what happens towards grazing
-STEP_U, STEP_S = 0.35, 0.6
+STEP_U, STEPS_S = 0.6, 12  # a step of u, and how many of s make a quarter turn
 STEEP, STEP_STEEP = 14.0, 3.0  # beyond this u, where cos theta = 2e-6, larger steps will do
 QUARTER = 11.4  # s of the y axis: tan phi starts from exp(-QUARTER) = 1e-5, the smallest ratio of two widths
-LOOSE = 1e-4  # of a term with reflectance 1, however little the material has of it: exponents are told from it
+LOOSE = 1e-4  # tolerance of the two rows that tell an exponent
+WEAKEST = 1e-2  # of reflectance 1, however little a material has of a term: it counts with this tolerance
 TOLD = 2e-3  # how well the last two rows tell an exponent
 
 
@@ -63,7 +64,7 @@ def azimuth_of(s: Tensor) -> Tensor:
 
 
 class Scan:
-    """Albedos over grids of the coordinates, and what they cost.
+    """Albedos at the coordinates, and what they cost.
 
     u: (U,), from the normal almost to the horizon; s: (S,), over as much of a turn as the terms' symmetry leaves.
     """
@@ -71,40 +72,48 @@ class Scan:
     def __init__(self, terms: Sequence[Lone], channels: int) -> None:
         self.terms, self.channels = terms, channels
         isotropic = all(term.symmetry.isotropic for term in terms)
-        mirrored = all(term.symmetry.mirrored for term in terms)
-        self.turn = 0.0 if isotropic else QUARTER if mirrored else 4 * QUARTER
+        self.mirrored = all(term.symmetry.mirrored for term in terms)
+        self.turn = 0.0 if isotropic else QUARTER if self.mirrored else 4 * QUARTER
         last = [math.acosh(1 / cosine) for cosine in (LOW, LOWEST)]
-        rows = [*np.arange(0, STEEP, STEP_U), *np.arange(STEEP, last[0], STEP_STEEP), *last]
-        self.u = torch.tensor(rows, dtype=torch.float64)
-        self.s = torch.linspace(0, self.turn, 1 + math.ceil(self.turn / STEP_S), dtype=torch.float64)
+        rows = [STEP_U / 2, 1.5 * STEP_U, *np.arange(0, STEEP, STEP_U), *np.arange(STEEP, last[0], STEP_STEEP), *last]
+        self.u = torch.tensor(sorted(rows), dtype=torch.float64)
+        self.s = torch.linspace(0, self.turn, 1 + round(self.turn / QUARTER) * STEPS_S, dtype=torch.float64)
         self.evaluations = 0
 
+    def rows(self, u: Tensor, tolerance: float) -> tuple[Tensor, Tensor]:
+        """The same as `albedos` for each u (U,) under every s of the scan: (T, U, S, C) each."""
+        found = self.albedos(u.repeat_interleave(len(self.s)), self.s.repeat(len(u)), tolerance)
+        parts, errors = (x.unflatten(1, (len(u), len(self.s))) for x in found)
+        return parts, errors
+
     def albedos(self, u: Tensor, s: Tensor, tolerance: float) -> tuple[Tensor, Tensor]:
-        """Each term's albedo [1] at each u (..., U) under each s (..., S), and its claimed error: (T, ..., U, S, C)."""
-        shape = (*u.shape, s.shape[-1], self.channels)
-        cosine = (1 / torch.cosh(u)).unsqueeze(-1)
+        """Each term's albedo [1] at pairs of u and s (N,), and the error claimed for it: (T, N, C) each."""
         parts, errors = [], []
         for form, values, reflectance, its in self.terms:
-            azimuth = azimuth_of(s[..., :1] * 0 if its.isotropic else s).unsqueeze(-2)
-            allowed = min(tolerance / len(self.terms) / max(reflectance, 1e-300), LOOSE)
-            found = of_form(form, values, cosine, azimuth, allowed)
+            at, inverse = torch.unique(u, return_inverse=True) if its.isotropic else (u, slice(None))
+            azimuth = u.new_zeros(1) if its.isotropic else azimuth_of(s)
+            allowed = min(tolerance / len(self.terms) / max(reflectance, 1e-300), WEAKEST)
+            found = of_form(form, values, 1 / torch.cosh(at), azimuth, allowed)
             self.evaluations += found.evaluations
-            parts.append(reflectance * found.values.expand(shape))
-            errors.append(reflectance * found.error.expand(shape))
-        # an albedo that no number holds counts as infinite
-        return torch.stack(parts).nan_to_num(nan=math.inf, posinf=math.inf), torch.stack(errors)
+            parts.append(reflectance * found.values[inverse].expand(-1, self.channels))
+            errors.append(reflectance * found.error[inverse].expand(-1, self.channels))
+        # what no number holds counts as infinite
+        albedo, error = (torch.stack(x).nan_to_num(nan=math.inf, posinf=math.inf) for x in (parts, errors))
+        return albedo, error
 
-    def exponents(self, parts: Tensor, errors: Tensor) -> Tensor:
-        """The e of each term's albedo ~ (cos theta)^-e, at least 0, (T, C), from the last two rows (T, 2, S, C).
+    def exponents(self) -> Tensor:
+        """The e of each term's albedo ~ (cos theta)^-e towards grazing, at least 0, (T, C).
 
-        Two albedos tell it to about 1e-4; where f itself grows by an exponent that agrees, that one is exact.
+        The albedos at two cosines tell it to about 1e-4; where f itself grows by an exponent that agrees, that one is
+        exact.
         """
+        u, s = (x.flatten() for x in torch.meshgrid(self.u[-2:], self.s[[0, -1]], indexing="ij"))
+        parts, errors = (x.unflatten(1, (2, 2)) for x in self.albedos(u, s, LOOSE))
         lit = ((parts > 0) & parts.isfinite()).all(1)
         low, lowest = (torch.where(lit, row, 1.0) for row in parts.unbind(1))
         known = torch.where(lit, (errors / torch.where(lit.unsqueeze(1), parts, 1.0)).sum(1), 0.0)
-        told, doubt = (x / math.log(LOW / LOWEST) for x in (torch.log(lowest / low), known))
-        doubt = doubt.amax(1) + TOLD
-        told = told.amax(1)
+        told, doubt = ((x / math.log(LOW / LOWEST)).amax(1) for x in (torch.log(lowest / low), known))
+        doubt = doubt + TOLD
         told = torch.where(told > doubt, told, 0.0)
         for lone, row, its in zip(self.terms, told, doubt, strict=True):
             exact = growth(lone.form, lone.values)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..models._compensation import HIGH, LOW, fresnel_rule, mean_rule
+from ..models._compensation import FRESNEL_RULE, HIGH, LOW, MEAN_RULE
 from .fresnel import exact_fresnel
 from .symbols import Number, Symbols, Values
 
@@ -59,7 +59,7 @@ def mean_lost(s: Symbols, table: Table, a: Number) -> Number:
         mu = scale * (s.math.exp(x * length) - 1)
         return 2 * weight * length * mu * (mu + scale) * lost(s, table, mu, a)[0]
 
-    return s.total(part, mean_rule(), (table, a))
+    return s.total(part, MEAN_RULE, (table, a))
 
 
 def _mean_fresnel(s: Symbols, v: Values) -> Number:
@@ -67,7 +67,7 @@ def _mean_fresnel(s: Symbols, v: Values) -> Number:
     if "f0" in v:
         return v["f0"] + (1 - v["f0"]) / 21
     index = s.complex(v["eta"], v["k"]) if "k" in v else v["eta"]
-    return s.total(lambda c, weight: weight * exact_fresnel(s, c, index), fresnel_rule(), index)
+    return s.total(lambda c, weight: weight * exact_fresnel(s, c, index), FRESNEL_RULE, index)
 
 
 def returned(s: Symbols, table: Table, v: Values) -> tuple[Number, Number]:

@@ -63,9 +63,14 @@ def coefficients(name: str) -> Tensor:
 
 
 @torch.compiler.assume_constant_result  # type: ignore[untyped-decorator]
-@functools.cache
 def pieces(name: str) -> Tensor:
-    """The same as cubic polynomials along the cosines, (widths, cells, 4).
+    """The same as cubic polynomials along the cosines, (widths, cells, 4); a constant to a compiler."""
+    return _pieces(name)
+
+
+@functools.cache
+def _pieces(name: str) -> Tensor:
+    """The polynomials' coefficients.
 
     They are made of the coefficients' differences, so that derivatives lose nothing where the spline is all but level.
     """
@@ -99,8 +104,7 @@ def spline(name: str, x: Tensor, y: Tensor) -> Tensor:
     return a + t * (b + t * (c + t * d))
 
 
-@functools.cache
-def mean_rule() -> tuple[list[float], list[float]]:
+def _mean_rule() -> tuple[list[float], list[float]]:
     """Nodes and weights of Gauss-Legendre panels over [0, 1]."""
     x, w = np.polynomial.legendre.leggauss(ORDER)
     nodes = (np.arange(PANELS)[:, None] + (1 + x) / 2) / PANELS
@@ -109,24 +113,26 @@ def mean_rule() -> tuple[list[float], list[float]]:
 
 def cosines(a: Tensor) -> tuple[Tensor, Tensor]:
     """Cosines, even in their logarithm, and weights, both (..., N): their sum is 2 integral of mu dmu over [0, 1]."""
-    x, w = (torch.tensor(numbers, dtype=a.dtype, device=a.device) for numbers in mean_rule())
+    x, w = (torch.tensor(numbers, dtype=a.dtype, device=a.device) for numbers in MEAN_RULE)
     scale = rise(a).unsqueeze(-1)
     length = torch.log1p(1 / scale)
     mu = scale * torch.expm1(x * length)
     return mu, 2 * w * length * mu * (mu + scale)
 
 
-@functools.cache
-def fresnel_rule() -> tuple[list[float], list[float]]:
+def _fresnel_rule() -> tuple[list[float], list[float]]:
     """Cosines c = t^2 and weights: their sum is 2 integral of c dc over [0, 1]."""
     x, w = np.polynomial.legendre.leggauss(NODES)
     t = (1 + x) / 2
     return (t * t).tolist(), (2 * w * t**3).tolist()
 
 
+MEAN_RULE, FRESNEL_RULE = _mean_rule(), _fresnel_rule()
+
+
 def mean_fresnel(values: Values) -> Tensor:
     """Fbar [1] of an exact Fresnel factor, () or (C,)."""
-    c, w = (torch.tensor(n, dtype=torch.float64, device=values["eta"].device) for n in fresnel_rule())
+    c, w = (torch.tensor(n, dtype=torch.float64, device=values["eta"].device) for n in FRESNEL_RULE)
     eta = values["eta"].double().unsqueeze(-1)
     if "k" in values:
         return (w * conductor(c, eta, values["k"].double().unsqueeze(-1))).sum(-1)

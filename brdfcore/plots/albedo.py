@@ -80,9 +80,9 @@ def _curve(
             f"Expected channel to be within 0..{count - 1}, got {channel}. Name a channel that the material has.",
             field="channel",
         )
-    index = int(found.values.mean(0).argmax()) if channel is None else channel
+    index = int(found.values.mean(0).nan_to_num(math.inf).argmax()) if channel is None else channel
     told = f"{label}, channel {index}" if count > 1 and channel is None else label
-    return told, np.asarray(found.values[:, index].numpy())
+    return told, np.nan_to_num(found.values[:, index].numpy(), nan=math.inf, posinf=math.inf)  # what no number holds
 
 
 def _place(theta: Array) -> Array:

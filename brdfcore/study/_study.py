@@ -50,6 +50,11 @@ class MakeStudy(Protocol):
         """The study with these seeds."""
 
 
+def two_digits(number: float) -> str:
+    """A positive number for a sentence: two digits, without an exponent where that is shorter."""
+    return f"{float(f'{number:.2g}'):g}"
+
+
 def installed(package: str) -> str | None:
     """The version of an installed package, None where there is none."""
     try:

@@ -21,7 +21,7 @@ from ..models import MODELS
 from ..models.material import Material, material
 from ..plots._panels import Curve, Panel
 from ..sampling import efficiency
-from ._study import Cell, Chart, Study
+from ._study import Cell, Chart, Study, two_digits
 from ._timing import interleaved
 
 ANGLES = (60.0, 0.0, 85.0)  # degrees; the first is plotted
@@ -181,15 +181,11 @@ def _sentence(rows: list[tuple[Cell, ...]], most: int) -> str:
     slower = {(str(r[0]), float(r[1] or 0)): float(r[7]) for r in rows if isinstance(r[7], float)}
     better = [float(r[8]) for r in rows if isinstance(r[8], float)]
     dearest = max(rows, key=lambda row: float(row[5] or 0))
-    gain = statistics.median(slower.values()) if slower else 1.0
+    gain = two_digits(statistics.median(slower.values()) if slower else 1.0)
+    even = two_digits(statistics.median(better) if better else 1.0)
     return (
-        f"Draw from a model's own sampler: it reaches the same error in 1/{_round(gain)} of the time that sampling in "
-        f"proportion to the cosine takes (median of {len(slower)}), and Sobol points cut the error of {most} samples "
-        f"to 1/{_round(statistics.median(better) if better else 1.0)} of that of random ones; {dearest[0]} at "
+        f"Draw from a model's own sampler: it reaches the same error in 1/{gain} of the time that "
+        f"sampling in proportion to the cosine takes (median of {len(slower)}), and Sobol points cut the error of "
+        f"{most} samples to 1/{even} of that of random ones; {dearest[0]} at "
         f"{dearest[1]:g} degrees is the dearest, with {dearest[5]} samples for an error of 1 %."
     )
-
-
-def _round(number: float) -> str:
-    """Two digits, without an exponent where that is shorter."""
-    return f"{float(f'{number:.2g}'):g}"

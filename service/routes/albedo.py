@@ -24,7 +24,7 @@ router = APIRouter(prefix="/v1/albedo", tags=["albedo"])
 
 _JSON = [Depends(json_accepted)]
 _JSON_LIMIT = 2**20  # bytes
-_MOST_INTEGRALS = 500  # directions times terms; a tenth of a second each where a lobe is hard and the tolerance small
+_MOST_INTEGRALS = {1e-7: 1000, 0.0: 100}  # directions times terms for tolerances from these on: up to 20 s of work
 _MOST_CHANNELS = 64  # each may be a lobe of its own
 _TOLERANCE = 1e-6  # where a request states none
 _NPZ = ("application/x-npz", "application/octet-stream")
@@ -126,16 +126,17 @@ def _submitted(service: State, asked: AlbedoRequest, content: bytes) -> Job:
 def _values(asked: AlbedoRequest) -> str:
     """The albedos as JSON."""
     material, theta_deg = material_of(asked.material), asked.theta_deg or []
+    tolerance = _TOLERANCE if asked.tolerance is None else asked.tolerance
+    most = next(count for least, count in _MOST_INTEGRALS.items() if tolerance >= least)
     integrals = len(theta_deg) * len(material.form.terms)
-    if integrals > _MOST_INTEGRALS or material.channels > _MOST_CHANNELS:
+    if integrals > most or material.channels > _MOST_CHANNELS:
         raise ProblemError(
             422,
-            f"Expected at most {_MOST_INTEGRALS} angles times terms and {_MOST_CHANNELS} channels, got {integrals} and "
-            f"{material.channels}. Ask in several requests, or for a table.",
+            f"Expected at most {most} angles times terms at the tolerance {tolerance:g} and at most {_MOST_CHANNELS} "
+            f"channels, got {integrals} and {material.channels}. Ask in several requests, or for a table.",
             field="theta_deg",
         )
     theta = torch.deg2rad(torch.tensor(theta_deg, dtype=torch.float64))
-    tolerance = _TOLERANCE if asked.tolerance is None else asked.tolerance
     with torch.no_grad():
         found = bc.albedo(material, theta, math.radians(asked.phi_deg), tolerance)
     return json.dumps(described(material, theta_deg, asked.phi_deg, found), allow_nan=False)

@@ -10,6 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import brdfcore as bc
+from brdfcore.energy.albedo import of_form
+from brdfcore.geometry import from_angles
 from brdfcore.models.form import Form, Term
 
 WIDE = (0.05, 0.5, 2.0, 10.0)
@@ -19,8 +21,15 @@ def certified(text: str, **more) -> bc.Certificate:
     return bc.certify(bc.material(text), **more)
 
 
-def degrees(theta: float) -> float:
-    return math.degrees(theta)
+def seen(material: bc.Material, cosine: torch.Tensor, azimuth: torch.Tensor, tolerance: float = 1e-7) -> torch.Tensor:
+    """Albedos by the cosine of the polar angle, which may be as good as 0."""
+    with torch.no_grad():
+        return of_form(material.form, material.values(), cosine, azimuth, tolerance).values
+
+
+def albedo(material: bc.Material, theta: float, phi: float = 0.0) -> torch.Tensor:
+    cosine, azimuth = torch.tensor([max(math.cos(theta), 1e-12), phi], dtype=torch.float64)
+    return seen(material, cosine, azimuth)
 
 
 # --- what the papers say --------------------------------------------------------------------------------------------
@@ -45,7 +54,7 @@ def test_lobes_that_diverge(text, exponent, beyond):
     assert "has no limit" in found.verdict
     if beyond is not None:
         digits = len(str(beyond).partition(".")[2])
-        assert round(degrees(found.exceeds[0]), digits) == beyond
+        assert round(math.degrees(found.exceeds[0]), digits) == beyond
         assert f"beyond {beyond} degrees" in found.verdict
     assert found.exceeds[1] == math.pi / 2
 
@@ -53,7 +62,7 @@ def test_lobes_that_diverge(text, exponent, beyond):
 def test_kurts_bound_of_alpha_is_none():
     """Kurt eq. 8, f <= F D / (4 (h.wo) ci), at equality: kurt with alpha = 1 at normal incidence; checked: 1.086."""
     lobe = bc.material("kurt(constant, ks=1, m=0.5, alpha=1)")
-    assert float(bc.albedo(lobe, 0.0).values) == pytest.approx(1.086, abs=5e-4)
+    assert float(albedo(lobe, 0.0)) == pytest.approx(1.086, abs=5e-4)
     found = bc.certify(lobe)
     assert found.exceeds[0] == 0
     assert "already at normal incidence" in found.verdict
@@ -63,7 +72,7 @@ def test_kurts_bound_of_alpha_is_none():
 def test_kurts_equation_9_is_not_plausible_for_rough_lobes(m, at_89_9):
     """Kurt eq. 9, "produces a physically plausible BRDF"; checked: these albedos at 89.9 degrees."""
     lobe = bc.material(f"kurt_plausible(constant, ks=1, m={m})")
-    assert float(bc.albedo(lobe, math.radians(89.9)).values) == pytest.approx(at_89_9, abs=6e-3)
+    assert float(albedo(lobe, math.radians(89.9))) == pytest.approx(at_89_9, abs=6e-3)
     found = bc.certify(lobe)
     assert not found.energy_conserving
     assert found.grazing_exponent == 0
@@ -107,7 +116,7 @@ def test_the_bounded_lobe_is_bounded(widths):
         "ward_neumann(rs=1, a=0.3)",
         "ashikhmin_premoze(constant, ks=1, a=0.5)",
         "cook_torrance(constant, ks=1, a=0.5)",
-        "ggx(constant, separable, ks=1, ax=0.1, ay=1)",
+        "ggx(constant, separable, ks=1, a=0.4)",
         "beckmann(constant, ks=1, a=0.5)",
         "lambert(kd=1)",
         "oren_nayar(energy_preserving, kd=1, sigma=0.8)",
@@ -162,17 +171,7 @@ def test_exponents(text, exponent):
 def test_the_exponent_is_the_integrals(text):
     """The albedo itself, over two decades, to 1e-3."""
     material = bc.material(text)
-    with torch.no_grad():
-        low, lower = (
-            bc.energy.of_form(
-                material.form,
-                {key: value.detach() for key, value in material.values().items()},
-                torch.tensor(cosine, dtype=torch.float64),
-                torch.tensor(0.3),
-                tolerance=1e-4,
-            ).values
-            for cosine in (1e-8, 1e-10)
-        )
+    low, lower = (seen(material, torch.tensor(cosine).double(), torch.tensor(0.3), 1e-4) for cosine in (1e-8, 1e-10))
     told = float(torch.log(lower / low)) / math.log(100)
     assert bc.certify(material, tolerance=1e-3).grazing_exponent == pytest.approx(told, abs=1e-3)
 
@@ -188,13 +187,11 @@ MAXIMA = [
 ]
 
 
-def dense(material: bc.Material, tolerance: float = 1e-5) -> torch.Tensor:
+def dense(material: bc.Material, angles: int = 40, azimuths: int = 9, tolerance: float = 1e-5) -> torch.Tensor:
     """Albedos over a grid that has nothing in common with the certificate's, (U, S, C)."""
-    cosine = torch.cat([torch.linspace(1, 0.02, 50, dtype=torch.float64), torch.logspace(-2, -9, 8).double()])
-    azimuth = torch.linspace(0, math.pi / 2, 13, dtype=torch.float64)
-    with torch.no_grad():
-        values = {key: value.detach() for key, value in material.values().items()}
-        return bc.energy.of_form(material.form, values, cosine.unsqueeze(-1), azimuth, tolerance).values
+    steep, grazing = torch.linspace(1, 0.03, angles), torch.logspace(-2, -9, angles // 4)
+    cosine = torch.cat([steep, grazing]).double().unsqueeze(-1)
+    return seen(material, cosine, torch.linspace(0, math.pi / 2, azimuths, dtype=torch.float64), tolerance)
 
 
 @pytest.mark.parametrize("text", MAXIMA)
@@ -203,9 +200,9 @@ def test_the_maximum_is_a_dense_scans(text):
     found = bc.certify(material)
     assert found.error <= found.tolerance
     largest = float(dense(material).max())
-    assert largest - 1e-5 <= found.max_albedo <= largest + 2e-3  # which the scan's steps leave
-    there = bc.albedo(material, min(found.at_theta, 1.5707), found.at_phi, tolerance=1e-7).values
-    assert float(there[found.channel]) == pytest.approx(found.max_albedo, abs=2e-6 if found.at_theta < 1.57 else 1e-3)
+    assert largest - 1e-5 <= found.max_albedo <= largest + 4e-3  # which the scan's steps leave
+    there = albedo(material, found.at_theta, found.at_phi)
+    assert float(there[found.channel]) == pytest.approx(found.max_albedo, abs=1e-6)
 
 
 @pytest.mark.parametrize("text", MAXIMA[:3])
@@ -213,7 +210,7 @@ def test_the_maximum_is_what_samples_weigh(text):
     """Monte Carlo shares no rule with the quadrature."""
     material = bc.material(text)
     found = bc.certify(material)
-    wo = bc.geometry.from_angles(*torch.tensor([found.at_theta, found.at_phi], dtype=torch.float64))
+    wo = from_angles(*torch.tensor([found.at_theta, found.at_phi], dtype=torch.float64))
     worth = bc.sampling.efficiency(material, wo, count=2**17)
     at = found.channel if material.channels > 1 else 0
     assert float(worth.mean[at]) == pytest.approx(found.max_albedo, abs=4.5 * float(worth.standard_error[at]))
@@ -234,33 +231,31 @@ def drawn(choice: bc.Model, number: int) -> bc.Material:
     return bc.Material(lobe, {f"{choice.name}.{name}": value for name, value in values.items()})
 
 
-@settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow])
-@given(
-    choice=st.sampled_from([choice for model in bc.MODELS.values() for choice in model.with_words(())]),
-    number=st.integers(0, 2**31),
-)
+EVERY = st.sampled_from([choice for model in bc.MODELS.values() for choice in model.with_words(())])
+
+
+@settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow])
+@given(choice=EVERY, number=st.integers(0, 2**31))
 def test_no_dense_scan_contradicts_a_certificate(choice, number):
-    contradict(choice, number)
+    contradict(choice, number, 16, 4)
 
 
 @pytest.mark.full
 @settings(max_examples=500, suppress_health_check=[HealthCheck.too_slow])
-@given(
-    choice=st.sampled_from([choice for model in bc.MODELS.values() for choice in model.with_words(())]),
-    number=st.integers(0, 2**31),
-)
+@given(choice=EVERY, number=st.integers(0, 2**31))
 def test_no_dense_scan_contradicts_a_certificate_in_many_cases(choice, number):
-    contradict(choice, number)
+    contradict(choice, number, 60, 13)
 
 
-def contradict(choice: bc.Model, number: int) -> None:
+def contradict(choice: bc.Model, number: int, angles: int, azimuths: int) -> None:
+    """Hold a certificate against a scan that may be denser."""
     material = drawn(choice, number)
     found = bc.certify(material, tolerance=1e-5)
-    largest = float(dense(material).max())
-    assert found.max_albedo >= largest * (1 - 1e-5) - 1e-5 - found.error
-    if found.energy_conserving:
-        assert largest <= 1 + 1e-4
-    assert found.reciprocal == choice.reciprocal or not choice.reciprocal  # edwards is nearly reciprocal where narrow
+    largest = float(dense(material, angles, 1 if found.isotropic else azimuths, 1e-4).max())
+    assert found.error <= 1e-5, str(material)
+    assert found.max_albedo >= largest * (1 - 1e-4) - 1e-4, str(material)
+    assert largest <= 1 + 2e-4 or not found.energy_conserving, str(material)
+    assert found.reciprocal or not choice.reciprocal, str(material)
     assert found.min_value >= 0
     assert not math.isnan(found.max_albedo + found.grazing_limit + found.error)
 
@@ -323,7 +318,8 @@ VERDICTS = {
         "exceeds": (HORIZON, HORIZON),
         "largest_before": 0.35,
     },
-    "Reflects more than it receives already at normal incidence: the albedo grows like 1/cos^0.5 theta and has no limit.": {
+    "Reflects more than it receives already at normal incidence: the albedo grows like 1/cos^0.5 theta and has no "
+    "limit.": {
         **DIVERGENT,
         "grazing_exponent": 0.5,
         "exceeds": (0.0, HORIZON),
@@ -338,8 +334,8 @@ VERDICTS = {
         "at_theta": math.radians(60),
         "exceeds": (0.0, math.radians(80.5)),
     },
-    "Conserves energy: the largest albedo is 0.2, at normal incidence. Not reciprocal: exchanging the directions changes "
-    "f by up to 12.3 %.": {"reciprocity_error": 0.123},
+    "Conserves energy: the largest albedo is 0.2, at normal incidence. Not reciprocal: exchanging the directions "
+    "changes f by up to 12.3 %.": {"reciprocity_error": 0.123},
 }
 
 

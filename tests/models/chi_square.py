@@ -51,7 +51,7 @@ class Cells:
         side_t, side_p = (band == bands - 1) * 1 - (band == 0), (sector == sectors - 1) * 1 - (sector == 0)
         pending = np.arange(self.count)
         result = np.full(self.count, np.nan)
-        for pieces in (1, 2, 4, 8, 16, 32, 64, 128):
+        for pieces in (1, 2, 4, 8, 16, 32, 64, 128, 256):
             steps = np.linspace(0, 1, pieces + 1)
             value = np.empty(len(pending))
             chunk = max(1, 2**18 // (pieces * NODES) ** 2)

@@ -181,7 +181,8 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "a boolean azimuth": ({"phi_deg": True}, "phi_deg", "number, got True"),
     "a tolerance of 0": ({"tolerance": 0.0}, "tolerance", "greater than or equal to"),
     "a loose tolerance": ({"tolerance": 0.5}, "tolerance", "less than or equal to 0.1"),
-    "too many angles": ({"theta_deg": [1.0] * 1001}, "theta_deg", "at most 500 angles times terms"),
+    "too many angles": ({"theta_deg": [1.0] * 501}, "theta_deg", "at most 1000 angles times terms"),
+    "too many for the tolerance": ({"theta_deg": [1.0] * 51, "tolerance": 1e-9}, "theta_deg", "at most 100 angles"),
     "too many channels": ({"material": f"lambert(kd={[0.1] * 65})"}, "theta_deg", "64 channels"),
     "an unknown field": ({"theta": [1.0]}, "theta", "Remove it"),
 }

@@ -24,7 +24,11 @@ def test_every_method_is_compared(study) -> None:
 
 
 def test_what_a_method_reached() -> None:
-    points = [_Point(1e-2, 5e-3, 9e-3, True), _Point(1e-4, 2e-5, 1e-4, True), _Point(1e-7, 1e-7, 5e-8, True)]
+    points = [
+        _Point(1e-2, 5e-3, 9e-3, True, 1.0),
+        _Point(1e-4, 2e-5, 1e-4, True, 1.0),
+        _Point(1e-7, 1e-7, 5e-8, True, 1.0),
+    ]
     near, far, smallest, after, hold = _reached(points, (0.1, 0.3, 0.2))
     assert (near, far) == (0.2, 0.2), "the soonest that is good enough"
     assert (smallest, after) == (1e-7, 0.2)
@@ -37,14 +41,17 @@ def test_the_sentence_is_computed() -> None:
     rows = [
         (0.1, 0.0, "auto", 0.01, 0.02, 1e-9, 0.1, True),
         (0.1, 60.0, "auto", 0.02, 0.04, 1e-9, 0.1, True),
-        (0.1, 0.0, "sobol", 0.05, None, 1e-4, 0.1, True),
-        (0.1, 60.0, "sobol", 0.3, None, 1e-4, 0.1, True),
-        (0.1, 0.0, "monte_carlo", None, None, 1e-2, 0.1, True),
+        (0.1, 0.0, "sobol", 0.05, 0.2, 1e-7, 0.1, True),
+        (0.1, 60.0, "sobol", 0.3, 0.8, 1e-7, 0.1, True),
+        (0.1, 0.0, "monte_carlo", 0.1, None, 1e-2, 0.1, True),
         (0.1, 60.0, "monte_carlo", None, None, 1e-2, 0.1, True),
     ]
     assert _sentence(rows) == (
-        "Leave the method to auto: it is within 1e-06 in 2 of 2 cases, after at most 0.04 s; within 0.001 are "
-        "sobol in 2 (10x the time of auto), monte_carlo in 0."
+        "Leave the method to auto: it is within 1e-06 in 2 of 2 cases, after at most 0.04 s; "
+        "sobol in 2 (15x the time), monte_carlo in 0."
     )
     rows[1] = (0.1, 60.0, "auto", 0.02, None, 1e-5, 0.1, True)
-    assert "in 1 of 2 cases, after at most 0.02 s" in _sentence(rows)
+    rows[5] = (*rows[5][:7], False)
+    text = _sentence(rows)
+    assert "in 1 of 2 cases, after at most 0.02 s; sobol in 2 (10x the time)" in text
+    assert text.endswith("doubt the claims of monte_carlo (1 of 2).")

