@@ -63,10 +63,10 @@ class Columns:
         found: dict[int, int] = {}
         at = 0
         for term in self.form.terms:
-            two = isinstance(term.model, FresnelTerm) and term.model.fresnel and not term.model.exact
-            if two:
+            count = len(term.model.typical_albedo)
+            if isinstance(term.model, FresnelTerm) and count == 2:
                 found[at + 1] = at
-            at += 2 if two else len(term.model.typical_albedo)
+            at += count
         return found
 
     def _coefficients(self, values: Natural) -> list[Tensor]:
