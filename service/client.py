@@ -105,6 +105,12 @@ class Client:
         gray: Sequence[str] = (),
         per_channel: Sequence[str] = (),
         seed: int = 0,
+        bounds: Mapping[str, Sequence[float]] | None = None,
+        starts: Sequence[Mapping[str, float | Sequence[float]]] = (),
+        robust: str | None = None,
+        robust_scale: float | None = None,
+        max_theta_deg: float | None = None,
+        conserve_energy: bool = False,
         format: str | None = None,  # noqa: A002 - the name that the library and the service use
         quantity: str | None = None,
         angle_unit: str | None = None,
@@ -118,6 +124,9 @@ class Client:
         """
         body: dict[str, Any] = {"model": model, "loss": loss, "optimizer": optimizer, "seed": seed}
         body |= {"fixed": _plain(dict(fixed or {})), "gray": list(gray), "per_channel": list(per_channel)}
+        body |= {"bounds": _plain(dict(bounds or {})), "starts": [_plain(dict(start)) for start in starts]}
+        body |= {"robust": robust, "robust_scale": robust_scale, "max_theta_deg": max_theta_deg}
+        body["conserve_energy"] = conserve_energy
         if isinstance(data, DatasetView):
             body["dataset"] = data.id
         elif isinstance(data, str | os.PathLike):

@@ -9,6 +9,7 @@ import httpx2
 from .client_errors import FitFailedError, FitUnfinishedError, JobFailedError, JobUnfinishedError, WaitError
 from .schemas import (
     FINISHED,
+    CertificateView,
     CostView,
     FitOutcome,
     FitView,
@@ -141,6 +142,11 @@ class FitResult(JobResult[FitView]):
     def undetermined(self) -> list[str]:
         """The parameters that the data do not determine."""
         return self.result.undetermined
+
+    @property
+    def certificate(self) -> CertificateView:
+        """Whether the fitted material could exist: its largest albedo and where, reciprocity, and a verdict."""
+        return self.result.certificate
 
     @property
     def cost(self) -> CostView:

@@ -4,6 +4,7 @@ Numbers are strict going in: no booleans, no numeric strings, no NaN or Infinity
 degrees and their names end in `_deg`; the BRDF is in 1/sr and never includes the cosine.
 """
 
+import math
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
@@ -131,6 +132,12 @@ class FitRequest(Body):
     gray: list[str] = Field([], description="keys that keep one value over all channels")
     per_channel: list[str] = Field([], description="keys that get one value a channel")
     seed: int = Field(0, ge=0, lt=2**63)
+    bounds: dict[str, Range] = Field({}, description='[low, high] within a key\'s own box, {"ggx.a": [0.1, 0.3]}')
+    starts: list[dict[str, PerChannel]] = Field([], max_length=64, description="values by key of further starts")
+    robust: str | None = Field(None, description="soft_l1 or cauchy: large residuals count less")
+    robust_scale: float | None = Field(None, description="residual from which they do; the data say, if absent")
+    max_theta_deg: float | None = Field(None, gt=0, le=90, description="steeper samples are left out [degrees]")
+    conserve_energy: bool = Field(False, description="keep every directional albedo at 1 or below")
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -140,7 +147,8 @@ class FitRequest(Body):
 
     def arguments(self) -> dict[str, Any]:
         """What `brdfcore.fit` and its check are asked, by keyword: everything but the data."""
-        return self.model_dump(exclude={"dataset", "samples"})
+        found = self.model_dump(exclude={"dataset", "samples", "max_theta_deg"})
+        return {**found, "max_theta": None if self.max_theta_deg is None else math.radians(self.max_theta_deg)}
 
 
 class EvaluationRequest(DirectionPairs):
@@ -267,6 +275,12 @@ class RequestView(View):
     gray: list[str]
     per_channel: list[str]
     seed: int
+    bounds: dict[str, list[float]] = {}
+    starts: list[dict[str, float | list[float]]] = []
+    robust: str | None = None
+    robust_scale: float | None = None
+    max_theta_deg: float | None = None
+    conserve_energy: bool = False
 
 
 class CostView(View):
@@ -277,6 +291,40 @@ class CostView(View):
     iterations: int
     starts: int
     optimizer: str
+
+
+class CertificateView(View):
+    """Whether the fitted material could exist, exactly as `Certificate.to_dict()` gives it; null where infinite."""
+
+    verdict: str = Field(description="the finding in plain sentences")
+    energy_conserving: bool
+    decided: bool = Field(description="whether the claimed error leaves no doubt of that")
+    max_albedo: float | None = Field(description="the largest directional albedo [1]")
+    error: float = Field(description="claimed for it [1]")
+    at_theta_deg: float = Field(description="where it is; 90 is the limit towards grazing")
+    at_phi_deg: float
+    channel: int
+    grazing_limit: float | None
+    grazing_exponent: float = Field(description="e of albedo ~ (cos theta)^-e; 0 where there is a limit")
+    exceeds_deg: tuple[float, float] | None = Field(description="first and last angle with an albedo above 1")
+    largest_before: float | None
+    reciprocal: bool
+    reciprocity_error: float
+    min_value: float = Field(description="the smallest BRDF met [1/sr]")
+    pairs: int
+    tolerance: float
+    evaluations: int
+    seconds: float
+
+
+class ConservationView(View):
+    """What it took to keep every albedo at 1 or below, and what that cost in error."""
+
+    free_objective: float = Field(description="the objective of the free optimum")
+    free_max_albedo: float | None = Field(description="its largest albedo [1]; null where infinite")
+    fixed: list[str] = Field(description="keys fixed where the albedo has a limit towards grazing")
+    directions: int = Field(description="at which albedos are held at 1")
+    seconds: float
 
 
 Interval = tuple[float, float] | None
@@ -303,6 +351,8 @@ class FitOutcome(View):
     gray: list[str]
     per_channel: list[str]
     chi_square: tuple[float, int] | None = Field(description="and its degrees of freedom, where sigma is known")
+    certificate: CertificateView
+    conservation: ConservationView | None = Field(description="where conserve_energy was asked for")
     cost: CostView
     channels: list[str]
     data: dict[str, Any]

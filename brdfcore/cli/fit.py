@@ -1,6 +1,7 @@
 """`brdf fit FILE --model TEXT`: fits a measured file and prints what came out."""
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +22,11 @@ def command(
     gray: Annotated[list[str] | None, typer.Option(help="A key with one value for all channels; repeatable.")] = None,
     per_channel: Annotated[list[str] | None, typer.Option(help="An f0 with a value a channel; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Of the scan for starts.")] = 0,
+    bounds: Annotated[list[str] | None, typer.Option(help="KEY=LOW:HIGH within KEY's box; repeatable.")] = None,
+    robust: Annotated[str | None, typer.Option(help="soft_l1 or cauchy: outliers count less.")] = None,
+    robust_scale: Annotated[float | None, typer.Option(help="Residual from which they do; else the data say.")] = None,
+    max_theta_deg: Annotated[float | None, typer.Option(help="Leave steeper samples out [degrees].")] = None,
+    conserve_energy: Annotated[bool, typer.Option("--conserve-energy", help="Keep every albedo at 1 or less.")] = False,
     format_: Annotated[str | None, typer.Option("--format", help="Insist on a format; else its content tells.")] = None,
     quantity: Annotated[
         str | None, typer.Option(help="brdf, brdf_cos or reflectance_factor, where the file does not say.")
@@ -49,6 +55,11 @@ def command(
             gray=gray or (),
             per_channel=per_channel or (),
             seed=seed,
+            bounds=dict(_range(text) for text in bounds or []),
+            robust=robust,
+            robust_scale=robust_scale,
+            max_theta=None if max_theta_deg is None else math.radians(max_theta_deg),
+            conserve_energy=conserve_energy,
             progress=progress,
         )
 
@@ -69,6 +80,20 @@ def _pair(text: str) -> tuple[str, float]:
     except ValueError as error:
         raise ParameterError(
             f"Expected --fixed to be KEY=NUMBER, got {text!r}. Write it like kurt.f0=0.04.", field="fixed"
+        ) from error
+
+
+def _range(text: str) -> tuple[str, tuple[float, float]]:
+    """The key and the two numbers of KEY=LOW:HIGH."""
+    from ..errors import ParameterError
+
+    key, _, ends = text.partition("=")
+    low, _, high = ends.partition(":")
+    try:
+        return key.strip(), (float(low), float(high))
+    except ValueError as error:
+        raise ParameterError(
+            f"Expected --bounds to be KEY=LOW:HIGH, got {text!r}. Write it like ggx.a=0.1:0.3.", field="bounds"
         ) from error
 
 

@@ -81,12 +81,20 @@ def test_fit_passes_its_options_on(run: Run, tmp_path: pathlib.Path) -> None:
     assert isinstance(result["parameters"]["kurt.ks"], float)
     assert len(result["parameters"]["lambert.kd"]) == 3
     assert result["data"]["quantity"] == "reflectance_factor"
+    options = ["--quantity", "brdf", "--bounds", "ward_bounded.a=0.2:0.3", "--robust", "cauchy", "--robust-scale", "2"]
+    options += ["--max-theta-deg", "30", "--conserve-energy"]
+    result = json.loads(run("fit", file, "--model", "lambert + ward_bounded", "--json", *options).stdout)
+    assert 0.2 <= result["parameters"]["ward_bounded.a"] <= 0.3
+    assert result["data"]["masked"][-1]["count"] == 1
+    assert result["conservation"] is not None
 
 
 MISTAKES = {
     "no file": (("fit", "absent.csv", "--model", "lambert"), "absent.csv"),
     "unknown model": (("fit", DATA, "--model", "lambrt"), "Did you mean 'lambert'"),
     "fixed without a number": (("fit", DATA, "--model", "lambert", "--fixed", "lambert.kd"), "KEY=NUMBER"),
+    "bounds without numbers": (("fit", DATA, "--model", "lambert", "--bounds", "lambert.kd=1"), "KEY=LOW:HIGH"),
+    "too steep": (("fit", DATA, "--model", "lambert", "--max-theta-deg", "0.1"), "radians (0.1 degrees)"),
     "plot suffix": (("fit", DATA, "--model", "lambert", "--plot", "x.pdf"), ".svg or .png"),
     "plot scale": (("fit", DATA, "--model", "lambert", "--plot", "x.svg", "--scale", "cubic"), "a scale"),
     "plot folder": (("fit", DATA, "--model", "lambert", "--plot", "nosuch/x.svg"), "folder to exist"),

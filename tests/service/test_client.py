@@ -89,6 +89,21 @@ def test_arguments_reach_the_service(client: Client) -> None:
     shown = fit.view.request
     assert (shown.loss, shown.optimizer, shown.gray, shown.seed) == ("l2", "lbfgs", ["lambert.kd"], 3)
     assert shown.fixed == {"ward_bounded.rs": [0.0, 0.0], "ward_bounded.a": 0.2}
+    fit = client.fit(
+        given,
+        model="lambert + ward_bounded",
+        bounds={"ward_bounded.a": (0.1, np.float64(0.2))},
+        starts=[{"ward_bounded.rs": torch.zeros(2)}],  # type: ignore[dict-item]
+        robust="cauchy",
+        robust_scale=0.3,
+        max_theta_deg=70,
+        conserve_energy=True,
+    )
+    shown = fit.view.request
+    assert (shown.bounds, shown.starts) == ({"ward_bounded.a": [0.1, 0.2]}, [{"ward_bounded.rs": [0.0, 0.0]}])
+    assert (shown.robust, shown.robust_scale, shown.max_theta_deg) == ("cauchy", 0.3, 70)
+    assert fit.certificate.energy_conserving
+    assert fit.result.conservation is not None
 
 
 def test_the_report_and_the_plots_are_for_people(client: Client) -> None:
