@@ -57,6 +57,15 @@ class ProgressView(View):
     loss: float | None
 
 
+class ProgressEvent(View):
+    """How a job stands, as its events tell it."""
+
+    status: JobStatus
+    progress: ProgressView | None
+    error: str | None
+    attempts: int
+
+
 class JobView(View):
     """What every job shows of itself."""
 
@@ -65,6 +74,7 @@ class JobView(View):
     progress: ProgressView | None
     error: str | None = Field(description="why it failed, in one sentence")
     attempts: int = Field(description="how often it was started")
+    reused: str | None = Field(None, description="the earlier job of the same work, whose result this is")
     created: datetime
     started: datetime | None
     finished: datetime | None

@@ -5,6 +5,7 @@ A job is a fit or a table of albedos. It is queued, then running under a lease, 
 Each claim adds 1 to `attempts`, which is also the fencing number: whoever holds an older number, or a job that is no
 longer running, is refused.
 A restart of the server ends an attempt through no fault of the job, so it is counted apart and capped apart.
+Work that has succeeded before, told by the hash of what determines its result, succeeds at once with that result.
 
 Every write is BEGIN IMMEDIATE: a deferred transaction that writes after a read fails at once when another has
 written in between, whatever the timeout.
@@ -20,6 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from brdfcore.errors import InvalidValueError
+
 from ..schemas import JobKind, JobStatus
 
 MOST_CRASHES = 3
@@ -27,10 +30,10 @@ MOST_RESTARTS = 20
 ASK_FOR_LESS = "Try fewer samples, fewer axes or a simpler model."
 
 _TABLE = """
-CREATE TABLE IF NOT EXISTS jobs (
+CREATE TABLE jobs (
     number    INTEGER PRIMARY KEY AUTOINCREMENT,
     id        TEXT NOT NULL UNIQUE,
-    kind      TEXT NOT NULL CHECK (kind IN ('fit', 'albedo_table')),
+    kind      TEXT NOT NULL,
     status    TEXT NOT NULL DEFAULT 'queued'
               CHECK (status IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
     body      BLOB NOT NULL,
@@ -43,11 +46,18 @@ CREATE TABLE IF NOT EXISTS jobs (
     lease_end REAL,
     created   REAL NOT NULL,
     started   REAL,
-    finished  REAL
+    finished  REAL,
+    owner     TEXT NOT NULL DEFAULT '',
+    work      TEXT,
+    reused    TEXT,
+    promise   TEXT UNIQUE,
+    promised  TEXT
 ) STRICT;
-CREATE INDEX IF NOT EXISTS jobs_by_status ON jobs (status, number);
+CREATE INDEX jobs_by_status ON jobs (status, number);
+CREATE INDEX jobs_by_work ON jobs (work) WHERE work IS NOT NULL;
 """
-_COLUMNS = "number, id, kind, status, request, progress, result, error, attempts, created, started, finished"
+_VERSION = 2  # of the table
+_COLUMNS = "number, id, kind, status, request, progress, result, error, attempts, created, started, finished, reused"
 
 
 @dataclass(frozen=True)
@@ -66,6 +76,23 @@ class Job:
     created: float
     started: float | None
     finished: float | None
+    reused: str | None = None  # the earlier job whose result this is
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A client's word that a submission under this key is the same one, sent again."""
+
+    key: str
+    content: str  # hash of the body that came with it
+
+
+class BrokenPromiseError(Exception):
+    """The key came before, with another body."""
+
+
+class QueueFullError(Exception):
+    """The owner has as many unfinished jobs as are allowed."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +113,7 @@ class JobStore:
         self._clock = clock
         self._writing, self._reading = threading.Lock(), threading.Lock()
         self._writer = _connect(path)
-        self._writer.executescript(_TABLE)
+        _prepare(self._writer)
         self._reader = _connect(path)  # reads never wait for a write to reach the disk
         self._reader.execute("PRAGMA query_only = ON")
 
@@ -95,13 +122,50 @@ class JobStore:
         self._reader.close()
         self._writer.close()
 
-    def submit(self, request: str, body: bytes, kind: JobKind = "fit") -> Job:
-        """A new queued job; `request` is what to show of it, `body` what to work on."""
-        job_id = uuid.uuid4().hex
+    def submit(
+        self,
+        request: str,
+        body: bytes,
+        kind: JobKind = "fit",
+        *,
+        work: str | None = None,
+        owner: str = "",
+        most: int | None = None,
+        promise: Promise | None = None,
+    ) -> Job:
+        """A new queued job; `request` is what to show of it, `body` what to work on.
+
+        work      hash of all that determines the result: where a job of the same has succeeded, so has this one
+        most      unfinished jobs that the owner may have; QueueFullError beyond
+        promise   where it was kept before, the job of that time; BrokenPromiseError where its content differs
+        """
+        job_id, now = uuid.uuid4().hex, self._clock()
         with self._write() as db:
+            if promise is not None:
+                known = db.execute(
+                    f"SELECT promised, {_COLUMNS} FROM jobs WHERE promise = ?", (promise.key,)
+                ).fetchall()
+                if known and known[0][0] != promise.content:
+                    raise BrokenPromiseError
+                if known:
+                    return _job(known[0][1:])
+            earlier = db.execute(
+                "SELECT id, result FROM jobs WHERE work = ? AND kind = ? AND status = 'succeeded' LIMIT 1", (work, kind)
+            ).fetchall()
+            if not earlier and most is not None:
+                unfinished = "SELECT count(*) FROM jobs WHERE owner = ? AND status IN ('queued', 'running')"
+                if db.execute(unfinished, (owner,)).fetchone()[0] >= most:
+                    raise QueueFullError
+            given: dict[str, object] = {"id": job_id, "kind": kind, "body": body, "request": request, "created": now}
+            given |= {"owner": owner, "work": work}
+            if promise is not None:
+                given |= {"promise": promise.key, "promised": promise.content}
+            if earlier:
+                given |= {"status": "succeeded", "reused": earlier[0][0], "result": earlier[0][1]}
+                given |= {"started": now, "finished": now}
+            places = ", ".join("?" * len(given))
             rows = db.execute(
-                f"INSERT INTO jobs (id, kind, body, request, created) VALUES (?, ?, ?, ?, ?) RETURNING {_COLUMNS}",
-                (job_id, kind, body, request, self._clock()),
+                f"INSERT INTO jobs ({', '.join(given)}) VALUES ({places}) RETURNING {_COLUMNS}", (*given.values(),)
             ).fetchall()
         return _job(rows[0])
 
@@ -110,20 +174,39 @@ class JobStore:
         rows = self._read(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", job_id)
         return _job(rows[0]) if rows else None
 
-    def newest(self, limit: int, before: int | None = None, kind: JobKind = "fit") -> list[Job]:
-        """Up to `limit` jobs of a kind with numbers below `before`, newest first."""
+    def newest(
+        self, limit: int, before: int | None = None, kind: JobKind = "fit", status: JobStatus | None = None
+    ) -> list[Job]:
+        """Up to `limit` jobs of a kind, and of a status, with numbers below `before`, newest first."""
         rows = self._read(
-            f"SELECT {_COLUMNS} FROM jobs WHERE number < ? AND kind = ? ORDER BY number DESC LIMIT ?",
+            f"SELECT {_COLUMNS} FROM jobs WHERE number < ? AND kind = ? AND status = coalesce(?, status) "
+            "ORDER BY number DESC LIMIT ?",
             2**63 - 1 if before is None else before,
             kind,
+            status,
             limit,
         )
         return [_job(row) for row in rows]
+
+    def counts(self) -> list[tuple[str, str, int]]:
+        """How many jobs there are of each kind and status."""
+        return self._read("SELECT kind, status, count(*) FROM jobs GROUP BY kind, status")
+
+    def forget(self, before: float) -> int:
+        """How many jobs had ended before that time [s since 1970]; they are removed."""
+        if not self._read("SELECT 1 FROM jobs WHERE finished < ? LIMIT 1", before):
+            return 0
+        with self._write() as db:
+            return db.execute("DELETE FROM jobs WHERE finished < ?", (before,)).rowcount
 
     def body(self, job_id: str) -> bytes | None:
         """What the job works on, as it was submitted."""
         rows = self._read("SELECT body FROM jobs WHERE id = ?", job_id)
         return bytes(rows[0][0]) if rows else None
+
+    def asks_for(self, dataset: str) -> bool:
+        """Whether a job is of that dataset."""
+        return bool(self._read("SELECT 1 FROM jobs WHERE instr(request, ?) LIMIT 1", dataset))
 
     def mentioned(self, kind: JobKind, text: str) -> bool:
         """Whether the result of a job of that kind mentions the text."""
@@ -175,14 +258,16 @@ class JobStore:
         """Whether the attempt still held its job; if so, it has failed for this reason."""
         return self._held("status = 'failed', error = ?, finished = ?", attempt, error, self._clock())
 
-    def retry(self, attempt: Attempt, what: str) -> bool:
-        """Whether the attempt still held its job; if so, it is queued again, or has failed after too many crashes."""
-        return self._held(
+    def retry(self, attempt: Attempt, what: str) -> JobStatus | None:
+        """What became of the job, queued again or failed after too many crashes; None if the attempt had lost it."""
+        held = self._held(
             "status = iif(attempts - restarts >= ?, 'failed', 'queued'), "
             "error = iif(attempts - restarts >= ?, ?, NULL), finished = iif(attempts - restarts >= ?, ?, NULL)",
             attempt,
             *(MOST_CRASHES, MOST_CRASHES, _given_up(what), MOST_CRASHES, self._clock()),
         )
+        job = self.get(attempt.id) if held else None
+        return job.status if job else None
 
     def reclaim(self) -> None:
         """Queue every running job again: for the one process that knows that nobody works on any of them."""
@@ -237,6 +322,25 @@ def _connect(path: Path) -> sqlite3.Connection:
     db.execute("PRAGMA journal_mode = WAL")
     db.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
     return db
+
+
+def _prepare(db: sqlite3.Connection) -> None:
+    """Make the table; refuse one that another version has made."""
+    db.execute("BEGIN IMMEDIATE")
+    try:
+        version = db.execute("PRAGMA user_version").fetchone()[0]
+        made = bool(db.execute("SELECT 1 FROM sqlite_master").fetchall())
+        if made and version != _VERSION:
+            raise InvalidValueError(
+                f"Expected jobs.sqlite3 to be of this version of the service ({_VERSION}), got version {version}. "
+                "Choose another data folder, or the version that made it.",
+                field="data",
+            )
+        for statement in _TABLE.split(";") if not made else ():
+            db.execute(statement)
+        db.execute(f"PRAGMA user_version = {_VERSION}")
+    finally:
+        db.execute("COMMIT")
 
 
 def _job(row: Any) -> Job:

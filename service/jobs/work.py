@@ -32,21 +32,23 @@ _log = logging.getLogger("service.jobs")
 
 
 def run(out: Connection, data: str, kind: JobKind, body: bytes, memory: int) -> None:
-    """Send ("progress", JSON) any number of times, then ("succeeded", JSON) or ("failed", sentence)."""
+    """Send ("progress", JSON) any number of times, then ("succeeded", JSON) or ("failed", sentence, reason)."""
     _settle(memory)
     try:
         out.send(("succeeded", _WORK[kind](out, Path(data), body)))
     except BrdfError as error:
-        out.send(("failed", str(error)))
+        out.send(("failed", str(error), "data"))
     except Exception as error:
         if isinstance(error, MemoryError) or "allocate memory" in str(error):  # torch raises RuntimeError for it
             sentence = f"Expected the job to need less than {memory} bytes, but it asked for more. {ASK_FOR_LESS}"
+            reason = "memory"
         else:
             _log.exception("a job raised")
+            reason = "internal"
             sentence = (
                 f"The job stopped with an internal error, {type(error).__name__}. The server's log has the details."
             )
-        out.send(("failed", sentence))
+        out.send(("failed", sentence, reason))
 
 
 def _fitted(out: Connection, data: Path, body: bytes) -> str:

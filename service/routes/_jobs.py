@@ -1,6 +1,7 @@
 """What the routes of every kind of job share: finding, waiting, cancelling, removing, and what is shown of a job."""
 
 import asyncio
+import hashlib
 import json
 import re
 import time
@@ -10,9 +11,11 @@ from typing import Any
 from fastapi import Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+import brdfcore as bc
+
 from ..errors import ProblemError
-from ..jobs.store import Job
-from ..schemas import FINISHED, JobKind
+from ..jobs.store import BrokenPromiseError, Job, Promise, QueueFullError
+from ..schemas import FINISHED, JobKind, JobStatus
 from ..state import State, state
 
 _LONGEST_WAIT = 60.0  # [s]
@@ -27,6 +30,51 @@ class Paging(BaseModel):
 
     limit: int = Field(20, ge=1, le=100)
     cursor: int | None = Field(None, ge=1, lt=2**63, description="`next` of the page before")
+    status: JobStatus | None = Field(None, description="only those of this status")
+
+
+def submitted(request: Request, kind: JobKind, shown: str, body: bytes, **identity: object) -> Job:
+    """The new job; the same as before where its Idempotency-Key was seen, with an earlier result where its work was.
+
+    shown is the JSON of its request, which with the identity determines the result. 409 where the key came with another
+    body, 429 where the queue of the request's API key is full.
+    """
+    service, owner = state(request), request.state.owner or ""
+    key = request.headers.get("idempotency-key")
+    if key is not None and not (0 < len(key) <= 255 and key.isascii() and key.isprintable()):
+        raise ProblemError(
+            422,
+            "Expected Idempotency-Key to be 1 to 255 printable characters. Use a new UUID for each submission.",
+            field="Idempotency-Key",
+        )
+    work = json.dumps({"version": bc.__version__, "kind": kind, "request": json.loads(shown), **identity})
+    try:
+        return service.store.submit(
+            shown,
+            body,
+            kind,
+            work=_digest(work),
+            owner=owner,
+            most=service.settings.queue_limit,
+            promise=None if key is None else Promise(_digest(f"{owner} {kind} {key}"), _digest(body)),
+        )
+    except BrokenPromiseError:
+        raise ProblemError(
+            409,
+            f"Expected the body that came first with the Idempotency-Key {key!r}, got another. Use a new key.",
+            field="Idempotency-Key",
+        ) from None
+    except QueueFullError:
+        most = service.settings.queue_limit
+        raise ProblemError(
+            429,
+            f"Expected at most {most} unfinished jobs at a time, got one more. Wait for some of them to end.",
+            headers={"retry-after": "10"},
+        ) from None
+
+
+def _digest(content: str | bytes) -> str:
+    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
 async def accepted(request: Request, response: Response, job: Job) -> Job:
@@ -47,7 +95,7 @@ async def accepted(request: Request, response: Response, job: Job) -> Job:
 
 def page_of(service: State, kind: JobKind, paging: Paging) -> tuple[list[Job], str | None]:
     """The jobs of a page, newest first, and the cursor of the next one."""
-    jobs = service.store.newest(paging.limit + 1, paging.cursor, kind)
+    jobs = service.store.newest(paging.limit + 1, paging.cursor, kind, paging.status)
     shown = jobs[: paging.limit]
     return shown, str(shown[-1].number) if len(jobs) > len(shown) else None
 
@@ -96,6 +144,7 @@ def summary(job: Job) -> dict[str, Any]:
         "progress": json.loads(job.progress) if job.progress else None,
         "request": json.loads(job.request),
         "error": job.error,
+        "reused": job.reused,
         "attempts": job.attempts,
         "created": _time(job.created),
         "started": _time(job.started),
