@@ -12,6 +12,7 @@ after the time that it names in Retry-After, else after a pause that doubles.
 import asyncio
 import os
 import time
+import uuid
 from collections.abc import AsyncIterator, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self, TypedDict, TypeVar, Unpack
@@ -30,13 +31,35 @@ from .client_errors import (
     UnreachableError,
     WaitError,
 )
-from .client_results import AsyncFitResult, AsyncTableResult, FitResult, TableResult
-from .schemas import AlbedoView, DatasetView, EvaluationView, FitView, ModelList, ModelView, Problem, TableView
+from .client_results import (
+    AsyncBatchResult,
+    AsyncFitResult,
+    AsyncTableResult,
+    BatchResult,
+    FitResult,
+    TableResult,
+)
+from .schemas import (
+    AlbedoView,
+    BatchView,
+    DatasetView,
+    EvaluationView,
+    FitPage,
+    FitSummary,
+    FitView,
+    JobStatus,
+    ModelList,
+    ModelView,
+    Problem,
+    TableView,
+)
 
 __all__ = [
+    "AsyncBatchResult",
     "AsyncClient",
     "AsyncFitResult",
     "AsyncTableResult",
+    "BatchResult",
     "Client",
     "ClientError",
     "FitFailedError",
@@ -96,6 +119,17 @@ class _Shared:
             return view
         left = None if timeout is None else max(0.0, timeout - (time.monotonic() - begun))
         return (yield from calls.finished("/v1/fits", view, "fit", FitFailedError, left, progress))
+
+    @staticmethod
+    def _batch(data: Iterable[Any], models: Sequence[str], options: FitOptions) -> Call[BatchView]:
+        declared = {name: options.get(name) for name in ("format", "quantity", "angle_unit")}
+        body = {name: calls.plain(value) for name, value in options.items() if name not in declared}
+        body |= {"models": list(models), "datasets": []}
+        for one in data:
+            dataset = one if isinstance(one, DatasetView) else (yield from calls.uploaded(one, declared))
+            body["datasets"].append(dataset.id)
+        headers = {"idempotency-key": uuid.uuid4().hex}
+        return (yield from calls.read(BatchView, "POST", "/v1/batches", json=body, headers=headers))
 
     @staticmethod
     def _table(
@@ -185,6 +219,25 @@ class Client(_Shared):
             except FitFailedError:
                 fit.refresh()
         return made
+
+    def batch(
+        self,
+        data: "Iterable[str | os.PathLike[str] | DatasetView]",
+        *,
+        models: Sequence[str],
+        **options: Unpack[FitOptions],
+    ) -> BatchResult:
+        """Fits of every model to every file or dataset, which run on; see BatchResult.wait, .rows and .csv."""
+        return BatchResult(self._run, self._run(self._batch(data, models, options)))
+
+    def get_batch(self, batch_id: str) -> BatchResult:
+        """The batch of that id as it stands."""
+        return BatchResult(self._run, self._run(calls.read(BatchView, "GET", f"/v1/batches/{batch_id}")))
+
+    def recent(self, limit: int = 20, status: JobStatus | None = None) -> list[FitSummary]:
+        """The newest fits without their results, up to 100, of a status where one is given."""
+        asked = {"limit": limit} | ({"status": status} if status else {})
+        return self._run(calls.read(FitPage, "GET", "/v1/fits", params=asked)).items
 
     def get(self, fit_id: str) -> FitResult:
         """The fit of that id as it stands."""
@@ -323,6 +376,25 @@ class AsyncClient(_Shared):
             except FitFailedError:
                 await fit.refresh()
         return made
+
+    async def batch(
+        self,
+        data: "Iterable[str | os.PathLike[str] | DatasetView]",
+        *,
+        models: Sequence[str],
+        **options: Unpack[FitOptions],
+    ) -> AsyncBatchResult:
+        """Fits of every model to every file or dataset, as `Client.batch` gives them."""
+        return AsyncBatchResult(self._run, await self._run(self._batch(data, models, options)))
+
+    async def get_batch(self, batch_id: str) -> AsyncBatchResult:
+        """The batch of that id as it stands."""
+        return AsyncBatchResult(self._run, await self._run(calls.read(BatchView, "GET", f"/v1/batches/{batch_id}")))
+
+    async def recent(self, limit: int = 20, status: JobStatus | None = None) -> list[FitSummary]:
+        """The newest fits without their results, as `Client.recent` gives them."""
+        asked = {"limit": limit} | ({"status": status} if status else {})
+        return (await self._run(calls.read(FitPage, "GET", "/v1/fits", params=asked))).items
 
     async def get(self, fit_id: str) -> AsyncFitResult:
         """The fit of that id as it stands."""

@@ -99,13 +99,13 @@ def fit_body(data: Any, given: Mapping[str, Any], declared: Mapping[str, Any]) -
     return body | {"dataset": dataset.id}
 
 
-def uploaded(path: str | os.PathLike[str], declared: Mapping[str, str | None]) -> Call[DatasetView]:
+def uploaded(path: str | os.PathLike[str], declared: Mapping[str, Any]) -> Call[DatasetView]:
     """The dataset made of a file, which is streamed from the disk."""
     with open(path, "rb") as file:
         return (yield from _dataset(file, declared))
 
 
-def _dataset(file: Any, declared: Mapping[str, str | None]) -> Call[DatasetView]:
+def _dataset(file: Any, declared: Mapping[str, Any]) -> Call[DatasetView]:
     given = {name: value for name, value in declared.items() if value is not None}
     headers = {"content-type": "application/octet-stream"}
     return (yield from read(DatasetView, "POST", "/v1/datasets", content=file, params=given, headers=headers))

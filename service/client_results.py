@@ -1,12 +1,16 @@
 """Jobs on the service, as the clients hand them out: fits and tables of albedos, to wait for or to await."""
 
+import time
 from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 from . import client_calls as calls
 from .client_calls import Call, Tell
-from .client_errors import FitFailedError, FitUnfinishedError, JobFailedError, JobUnfinishedError
+from .client_errors import FitFailedError, FitUnfinishedError, JobFailedError, JobUnfinishedError, WaitError
 from .schemas import (
+    BatchRow,
+    BatchTable,
+    BatchView,
     CertificateView,
     CostView,
     FitOutcome,
@@ -156,6 +160,47 @@ class _Table(_Job[TableView]):
         return (yield from calls.content("GET", f"{self._path}/{self.id}/table", headers={"accept": accept}))
 
 
+class _Batch:
+    """Fits that were submitted together."""
+
+    view: BatchView
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.id}, {dict(self.view.counts)})"
+
+    @property
+    def id(self) -> str:
+        """The batch's id."""
+        return self.view.id
+
+    def _answered(self, method: str, tail: str) -> Call[Self]:
+        self.view = yield from calls.read(BatchView, method, f"/v1/batches/{self.id}{tail}")
+        return self
+
+    def _finished(self, timeout: float | None, progress: Callable[[BatchView], None] | None) -> Call[Self]:
+        begun = time.monotonic()
+        while True:
+            if progress is not None:
+                progress(self.view)
+            waited = time.monotonic() - begun
+            if self.view.finished:
+                return self
+            if timeout is not None and waited >= timeout:
+                raise WaitError(f"Expected batch {self.id} to finish in the time given, but it runs.")
+            yield calls.Pause(min(max(waited / 10, 0.05), 1.0))
+            yield from self._answered("GET", "")
+
+    def _rows(self) -> Call[list[BatchRow]]:
+        return (yield from calls.read(BatchTable, "GET", f"/v1/batches/{self.id}/table")).rows
+
+    def _csv(self) -> Call[str]:
+        path = f"/v1/batches/{self.id}/table"
+        return (yield from calls.content("GET", path, headers={"accept": "text/csv"})).decode()
+
+    def _removed(self) -> Call[None]:
+        yield from calls.content("DELETE", f"/v1/batches/{self.id}")
+
+
 class _Waiting(_Job[View]):
     """What waits for the service."""
 
@@ -243,6 +288,80 @@ class AsyncFitResult(_Fit, _Awaited[FitView]):
         drawn = self._drawn(name, kind, scale=scale, theta_i_deg=theta_i_deg, channel=channel)
         image: bytes = await self._run(drawn)
         return image
+
+
+class BatchResult(_Batch):
+    """Fits that were submitted together."""
+
+    def __init__(self, run: Run, view: BatchView) -> None:
+        self._run = run
+        self.view = view
+
+    def refresh(self) -> Self:
+        """The batch as it stands now."""
+        found: Self = self._run(self._answered("GET", ""))
+        return found
+
+    def wait(self, timeout: float | None = None, progress: Callable[[BatchView], None] | None = None) -> Self:
+        """The batch once no fit of it is queued or running, however they ended; WaitError after `timeout` s."""
+        found: Self = self._run(self._finished(timeout, progress))
+        return found
+
+    def rows(self) -> list[BatchRow]:
+        """Its fits as they stand, in the order of datasets, then of models."""
+        found: list[BatchRow] = self._run(self._rows())
+        return found
+
+    def csv(self) -> str:
+        """The same as a CSV file."""
+        found: str = self._run(self._csv())
+        return found
+
+    def cancel(self) -> Self:
+        """The batch, what of it was not finished cancelled."""
+        found: Self = self._run(self._answered("POST", "/cancel"))
+        return found
+
+    def delete(self) -> None:
+        """Remove the batch and its fits from the service."""
+        self._run(self._removed())
+
+
+class AsyncBatchResult(_Batch):
+    """The same, to be awaited."""
+
+    def __init__(self, run: Start, view: BatchView) -> None:
+        self._run = run
+        self.view = view
+
+    async def refresh(self) -> Self:
+        """The batch as it stands now."""
+        found: Self = await self._run(self._answered("GET", ""))
+        return found
+
+    async def wait(self, timeout: float | None = None, progress: Callable[[BatchView], None] | None = None) -> Self:
+        """The batch once no fit of it is queued or running, however they ended; WaitError after `timeout` s."""
+        found: Self = await self._run(self._finished(timeout, progress))
+        return found
+
+    async def rows(self) -> list[BatchRow]:
+        """Its fits as they stand, in the order of datasets, then of models."""
+        found: list[BatchRow] = await self._run(self._rows())
+        return found
+
+    async def csv(self) -> str:
+        """The same as a CSV file."""
+        found: str = await self._run(self._csv())
+        return found
+
+    async def cancel(self) -> Self:
+        """The batch, what of it was not finished cancelled."""
+        found: Self = await self._run(self._answered("POST", "/cancel"))
+        return found
+
+    async def delete(self) -> None:
+        """Remove the batch and its fits from the service."""
+        await self._run(self._removed())
 
 
 class TableResult(_Table, _Waiting[TableView]):

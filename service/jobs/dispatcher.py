@@ -13,8 +13,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
+from .records import Attempt
 from .runner import Event, Runner
-from .store import ASK_FOR_LESS, Attempt, JobStore
+from .store import ASK_FOR_LESS, JobStore
 
 _BUSY = 0.05  # how soon a cancelled attempt is noticed [s]
 _SWEEP = 600.0  # how often what is old is looked for [s]

@@ -15,7 +15,7 @@ from typing import Literal, Protocol
 
 from ..schemas import JobKind
 from . import work
-from .store import Attempt
+from .records import Attempt
 
 Work = Callable[[Connection, str, JobKind, bytes, int], None]
 

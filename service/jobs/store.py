@@ -12,97 +12,33 @@ written in between, whatever the timeout.
 """
 
 import contextlib
+import math
 import sqlite3
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from brdfcore.errors import InvalidValueError
-
 from ..schemas import JobKind, JobStatus
+from .records import (
+    BATCH,
+    COLUMNS,
+    Asked,
+    Attempt,
+    Batch,
+    BrokenPromiseError,
+    Job,
+    Promise,
+    QueueFullError,
+    connect,
+    prepare,
+)
 
 MOST_CRASHES = 3
 MOST_RESTARTS = 20
 ASK_FOR_LESS = "Try fewer samples, fewer axes or a simpler model."
-
-_TABLE = """
-CREATE TABLE jobs (
-    number    INTEGER PRIMARY KEY AUTOINCREMENT,
-    id        TEXT NOT NULL UNIQUE,
-    kind      TEXT NOT NULL,
-    status    TEXT NOT NULL DEFAULT 'queued'
-              CHECK (status IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
-    body      BLOB NOT NULL,
-    request   TEXT NOT NULL,
-    progress  TEXT,
-    result    TEXT,
-    error     TEXT,
-    attempts  INTEGER NOT NULL DEFAULT 0,
-    restarts  INTEGER NOT NULL DEFAULT 0,
-    lease_end REAL,
-    created   REAL NOT NULL,
-    started   REAL,
-    finished  REAL,
-    owner     TEXT NOT NULL DEFAULT '',
-    work      TEXT,
-    reused    TEXT,
-    promise   TEXT UNIQUE,
-    promised  TEXT
-) STRICT;
-CREATE INDEX jobs_by_status ON jobs (status, number);
-CREATE INDEX jobs_by_work ON jobs (work) WHERE work IS NOT NULL;
-"""
-_VERSION = 2  # of the table
-_COLUMNS = "number, id, kind, status, request, progress, result, error, attempts, created, started, finished, reused"
-
-
-@dataclass(frozen=True)
-class Job:
-    """A job as it stands; request, progress and result are JSON text, times are seconds since 1970."""
-
-    number: int
-    id: str
-    kind: JobKind
-    status: JobStatus
-    request: str
-    progress: str | None
-    result: str | None
-    error: str | None
-    attempts: int
-    created: float
-    started: float | None
-    finished: float | None
-    reused: str | None = None  # the earlier job whose result this is
-
-
-@dataclass(frozen=True)
-class Promise:
-    """A client's word that a submission under this key is the same one, sent again."""
-
-    key: str
-    content: str  # hash of the body that came with it
-
-
-class BrokenPromiseError(Exception):
-    """The key came before, with another body."""
-
-
-class QueueFullError(Exception):
-    """The owner has as many unfinished jobs as are allowed."""
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """A claimed job: its body, and the fencing number that every later word about it must carry."""
-
-    id: str
-    fence: int
-    body: bytes
-    kind: JobKind = "fit"
 
 
 class JobStore:
@@ -112,9 +48,9 @@ class JobStore:
         self.lease = lease
         self._clock = clock
         self._writing, self._reading = threading.Lock(), threading.Lock()
-        self._writer = _connect(path)
-        _prepare(self._writer)
-        self._reader = _connect(path)  # reads never wait for a write to reach the disk
+        self._writer = connect(path)
+        prepare(self._writer)
+        self._reader = connect(path)  # reads never wait for a write to reach the disk
         self._reader.execute("PRAGMA query_only = ON")
 
     def close(self) -> None:
@@ -139,39 +75,110 @@ class JobStore:
         most      unfinished jobs that the owner may have; QueueFullError beyond
         promise   where it was kept before, the job of that time; BrokenPromiseError where its content differs
         """
-        job_id, now = uuid.uuid4().hex, self._clock()
         with self._write() as db:
             if promise is not None:
-                known = db.execute(
-                    f"SELECT promised, {_COLUMNS} FROM jobs WHERE promise = ?", (promise.key,)
-                ).fetchall()
+                known = db.execute(f"SELECT promised, {COLUMNS} FROM jobs WHERE promise = ?", (promise.key,)).fetchall()
                 if known and known[0][0] != promise.content:
                     raise BrokenPromiseError
                 if known:
                     return _job(known[0][1:])
-            earlier = db.execute(
-                "SELECT id, result FROM jobs WHERE work = ? AND kind = ? AND status = 'succeeded' LIMIT 1", (work, kind)
-            ).fetchall()
-            if not earlier and most is not None:
-                unfinished = "SELECT count(*) FROM jobs WHERE owner = ? AND status IN ('queued', 'running')"
-                if db.execute(unfinished, (owner,)).fetchone()[0] >= most:
-                    raise QueueFullError
-            given: dict[str, object] = {"id": job_id, "kind": kind, "body": body, "request": request, "created": now}
-            given |= {"owner": owner, "work": work}
+            (job,) = self._added(db, [Asked(request, body, kind, work)], owner, most)
             if promise is not None:
-                given |= {"promise": promise.key, "promised": promise.content}
+                db.execute(
+                    "UPDATE jobs SET promise = ?, promised = ? WHERE id = ?", (promise.key, promise.content, job.id)
+                )
+        return job
+
+    def submit_batch(
+        self, request: str, asked: Sequence[Asked], *, owner: str = "", most: int | None = None, promise: Promise | None
+    ) -> Batch:
+        """New queued jobs that belong together, all or none of them; `most` and `promise` are as in `submit`."""
+        batch_id = uuid.uuid4().hex
+        with self._write() as db:
+            if promise is not None:
+                known = db.execute(
+                    f"SELECT promised, {BATCH} FROM batches WHERE promise = ?", (promise.key,)
+                ).fetchall()
+                if known and known[0][0] != promise.content:
+                    raise BrokenPromiseError
+                if known:
+                    return Batch(*known[0][1:])
+            self._added(db, asked, owner, most, batch_id)
+            kept = (None, None) if promise is None else (promise.key, promise.content)
+            rows = db.execute(
+                "INSERT INTO batches (id, request, created, promise, promised) VALUES (?, ?, ?, ?, ?) "
+                f"RETURNING {BATCH}",
+                (batch_id, request, self._clock(), *kept),
+            ).fetchall()
+        return Batch(*rows[0])
+
+    def _added(
+        self, db: sqlite3.Connection, asked: Sequence[Asked], owner: str, most: int | None, batch: str | None = None
+    ) -> list[Job]:
+        """New jobs; those whose work has succeeded before have, too."""
+        unfinished = "SELECT count(*) FROM jobs WHERE owner = ? AND status IN ('queued', 'running')"
+        room = math.inf if most is None else most - db.execute(unfinished, (owner,)).fetchone()[0]
+        now, made = self._clock(), []
+        for one in asked:
+            given: dict[str, object] = {"id": uuid.uuid4().hex, "kind": one.kind, "body": one.body, "created": now}
+            given |= {"request": one.request, "owner": owner, "work": one.work, "batch": batch}
+            earlier = db.execute(
+                "SELECT id, result FROM jobs WHERE work = ? AND kind = ? AND status = 'succeeded' LIMIT 1",
+                (one.work, one.kind),
+            ).fetchall()
             if earlier:
                 given |= {"status": "succeeded", "reused": earlier[0][0], "result": earlier[0][1]}
                 given |= {"started": now, "finished": now}
+            else:
+                room -= 1
+            if room < 0:
+                raise QueueFullError
             places = ", ".join("?" * len(given))
             rows = db.execute(
-                f"INSERT INTO jobs ({', '.join(given)}) VALUES ({places}) RETURNING {_COLUMNS}", (*given.values(),)
+                f"INSERT INTO jobs ({', '.join(given)}) VALUES ({places}) RETURNING {COLUMNS}", (*given.values(),)
             ).fetchall()
-        return _job(rows[0])
+            made.append(_job(rows[0]))
+        return made
+
+    def batch(self, batch_id: str) -> Batch | None:
+        """The batch of that id."""
+        rows = self._read(f"SELECT {BATCH} FROM batches WHERE id = ?", batch_id)
+        return Batch(*rows[0]) if rows else None
+
+    def batches(self, limit: int, before: int | None = None) -> list[Batch]:
+        """Up to `limit` batches with numbers below `before`, newest first."""
+        number = 2**63 - 1 if before is None else before
+        rows = self._read(f"SELECT {BATCH} FROM batches WHERE number < ? ORDER BY number DESC LIMIT ?", number, limit)
+        return [Batch(*row) for row in rows]
+
+    def of_batch(self, batch_id: str) -> list[Job]:
+        """The jobs of a batch, in the order of its request; those that were removed since are missing."""
+        return [
+            _job(row) for row in self._read(f"SELECT {COLUMNS} FROM jobs WHERE batch = ? ORDER BY number", batch_id)
+        ]
+
+    def standing(self, batch_id: str) -> list[tuple[JobStatus, str | None]]:
+        """Status and progress of each job of a batch."""
+        return self._read("SELECT status, progress FROM jobs WHERE batch = ?", batch_id)
+
+    def cancel_batch(self, batch_id: str) -> None:
+        """Cancel what of the batch is queued or running."""
+        with self._write() as db:
+            db.execute(
+                "UPDATE jobs SET status = 'cancelled', finished = ? "
+                "WHERE batch = ? AND status IN ('queued', 'running')",
+                (self._clock(), batch_id),
+            )
+
+    def delete_batch(self, batch_id: str) -> bool:
+        """Whether there was such a batch; now there is none, and none of its jobs."""
+        with self._write() as db:
+            db.execute("DELETE FROM jobs WHERE batch = ?", (batch_id,))
+            return db.execute("DELETE FROM batches WHERE id = ?", (batch_id,)).rowcount == 1
 
     def get(self, job_id: str) -> Job | None:
         """The job of that id."""
-        rows = self._read(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", job_id)
+        rows = self._read(f"SELECT {COLUMNS} FROM jobs WHERE id = ?", job_id)
         return _job(rows[0]) if rows else None
 
     def newest(
@@ -179,7 +186,7 @@ class JobStore:
     ) -> list[Job]:
         """Up to `limit` jobs of a kind, and of a status, with numbers below `before`, newest first."""
         rows = self._read(
-            f"SELECT {_COLUMNS} FROM jobs WHERE number < ? AND kind = ? AND status = coalesce(?, status) "
+            f"SELECT {COLUMNS} FROM jobs WHERE number < ? AND kind = ? AND status = coalesce(?, status) "
             "ORDER BY number DESC LIMIT ?",
             2**63 - 1 if before is None else before,
             kind,
@@ -197,7 +204,12 @@ class JobStore:
         if not self._read("SELECT 1 FROM jobs WHERE finished < ? LIMIT 1", before):
             return 0
         with self._write() as db:
-            return db.execute("DELETE FROM jobs WHERE finished < ?", (before,)).rowcount
+            count = db.execute("DELETE FROM jobs WHERE finished < ?", (before,)).rowcount
+            db.execute(
+                "DELETE FROM batches WHERE created < ? AND id NOT IN (SELECT batch FROM jobs WHERE batch > '')",
+                (before,),
+            )
+            return count
 
     def body(self, job_id: str) -> bytes | None:
         """What the job works on, as it was submitted."""
@@ -315,32 +327,6 @@ class JobStore:
     def _read(self, query: str, *values: object) -> list[Any]:
         with self._reading:
             return self._reader.execute(query, values).fetchall()
-
-
-def _connect(path: Path) -> sqlite3.Connection:
-    db = sqlite3.connect(path, timeout=5.0, isolation_level=None, check_same_thread=False)
-    db.execute("PRAGMA journal_mode = WAL")
-    db.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
-    return db
-
-
-def _prepare(db: sqlite3.Connection) -> None:
-    """Make the table; refuse one that another version has made."""
-    db.execute("BEGIN IMMEDIATE")
-    try:
-        version = db.execute("PRAGMA user_version").fetchone()[0]
-        made = bool(db.execute("SELECT 1 FROM sqlite_master").fetchall())
-        if made and version != _VERSION:
-            raise InvalidValueError(
-                f"Expected jobs.sqlite3 to be of this version of the service ({_VERSION}), got version {version}. "
-                "Choose another data folder, or the version that made it.",
-                field="data",
-            )
-        for statement in _TABLE.split(";") if not made else ():
-            db.execute(statement)
-        db.execute(f"PRAGMA user_version = {_VERSION}")
-    finally:
-        db.execute("COMMIT")
 
 
 def _job(row: Any) -> Job:

@@ -1,10 +1,12 @@
 """What the routes of every kind of job share: finding, waiting, cancelling, removing, and what is shown of a job."""
 
 import asyncio
+import contextlib
 import hashlib
 import json
 import re
 import time
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from typing import Any
 
@@ -14,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 import brdfcore as bc
 
 from ..errors import ProblemError
-from ..jobs.store import BrokenPromiseError, Job, Promise, QueueFullError
+from ..jobs.records import BrokenPromiseError, Job, Promise, QueueFullError
 from ..schemas import FINISHED, JobKind, JobStatus
 from ..state import State, state
 
@@ -36,10 +38,28 @@ class Paging(BaseModel):
 def submitted(request: Request, kind: JobKind, shown: str, body: bytes, **identity: object) -> Job:
     """The new job; the same as before where its Idempotency-Key was seen, with an earlier result where its work was.
 
-    shown is the JSON of its request, which with the identity determines the result. 409 where the key came with another
-    body, 429 where the queue of the request's API key is full.
+    shown is the JSON of its request, which with the identity determines the result. Raises as `refusals` does.
     """
-    service, owner = state(request), request.state.owner or ""
+    work = work_of(kind, shown, **identity)
+    with refusals(request) as (owner, most, promise):
+        return state(request).store.submit(
+            shown, body, kind, work=work, owner=owner, most=most, promise=promise(kind, body)
+        )
+
+
+def work_of(kind: JobKind, shown: str, **identity: object) -> str:
+    """The hash of all that determines a job's result."""
+    work = {"version": bc.__version__, "kind": kind, "request": json.loads(shown), **identity}
+    return _digest(json.dumps(work))
+
+
+@contextlib.contextmanager
+def refusals(request: Request) -> Iterator[tuple[str, int, Callable[[str, bytes], Promise | None]]]:
+    """The owner of what is submitted, the most unfinished jobs of that owner, and what makes the request's promise.
+
+    409 where the Idempotency-Key came with another body, 429 where the owner's queue is full, 422 for what is no key.
+    """
+    owner, most = request.state.owner or "", state(request).settings.queue_limit
     key = request.headers.get("idempotency-key")
     if key is not None and not (0 < len(key) <= 255 and key.isascii() and key.isprintable()):
         raise ProblemError(
@@ -47,16 +67,11 @@ def submitted(request: Request, kind: JobKind, shown: str, body: bytes, **identi
             "Expected Idempotency-Key to be 1 to 255 printable characters. Use a new UUID for each submission.",
             field="Idempotency-Key",
         )
-    work = json.dumps({"version": bc.__version__, "kind": kind, "request": json.loads(shown), **identity})
     try:
-        return service.store.submit(
-            shown,
-            body,
-            kind,
-            work=_digest(work),
-            owner=owner,
-            most=service.settings.queue_limit,
-            promise=None if key is None else Promise(_digest(f"{owner} {kind} {key}"), _digest(body)),
+        yield (
+            owner,
+            most,
+            lambda kind, body: None if key is None else Promise(_digest(f"{owner} {kind} {key}"), _digest(body)),
         )
     except BrokenPromiseError:
         raise ProblemError(
@@ -65,10 +80,9 @@ def submitted(request: Request, kind: JobKind, shown: str, body: bytes, **identi
             field="Idempotency-Key",
         ) from None
     except QueueFullError:
-        most = service.settings.queue_limit
         raise ProblemError(
             429,
-            f"Expected at most {most} unfinished jobs at a time, got one more. Wait for some of them to end.",
+            f"Expected at most {most} unfinished jobs at a time, got more. Wait for some of them to end.",
             headers={"retry-after": "10"},
         ) from None
 
@@ -146,9 +160,9 @@ def summary(job: Job) -> dict[str, Any]:
         "error": job.error,
         "reused": job.reused,
         "attempts": job.attempts,
-        "created": _time(job.created),
-        "started": _time(job.started),
-        "finished": _time(job.finished),
+        "created": time_of(job.created),
+        "started": None if job.started is None else time_of(job.started),
+        "finished": None if job.finished is None else time_of(job.finished),
     }
 
 
@@ -178,5 +192,6 @@ async def _finished(request: Request, job: Job, seconds: float) -> Job:
     return job
 
 
-def _time(seconds: float | None) -> datetime | None:
-    return None if seconds is None else datetime.fromtimestamp(seconds, UTC)
+def time_of(seconds: float) -> datetime:
+    """The time of so many seconds since 1970."""
+    return datetime.fromtimestamp(seconds, UTC)

@@ -13,7 +13,7 @@ from brdfcore.energy._described import described
 
 from .. import tables
 from ..errors import ProblemError, inlined, responses
-from ..jobs.store import Job
+from ..jobs.records import Job
 from ..materials import material_of
 from ..schemas import AlbedoRequest, AlbedoView, TablePage, TableSummary, TableView
 from ..state import State, state

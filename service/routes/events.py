@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Header, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from ..errors import responses
-from ..jobs.store import Job
+from ..jobs.records import Job
 from ..schemas import FINISHED, JobKind, ProgressEvent
 from ..state import state
 from . import _jobs

@@ -9,7 +9,7 @@ from brdfcore.fitting import check
 
 from ..datasets import inline_samples, missing
 from ..errors import ProblemError, inlined, responses
-from ..jobs.store import Job
+from ..jobs.records import Job
 from ..schemas import FitPage, FitRequest, FitSummary, FitView, RequestView, SamplesView
 from ..state import state
 from . import _jobs

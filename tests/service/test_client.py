@@ -355,6 +355,13 @@ def test_many_fits_at_once_keep_their_order(client: Client) -> None:
     assert made[2].parameters["lambert.kd"] == pytest.approx(2 * made[0].parameters["lambert.kd"], rel=1e-9)  # type: ignore[operator]
 
 
+def test_the_newest_fits_are_listed(client: Client) -> None:
+    made = [client.fit(measured_diffuser(), model="lambert", seed=seed).id for seed in range(2)]
+    assert [fit.id for fit in client.recent()] == made[::-1]
+    assert client.recent(1, "succeeded")[0].id == made[1]
+    assert client.recent(status="failed") == []
+
+
 def test_progress_is_told_and_a_result_is_a_material(client: Client) -> None:
     told: list[float] = []
     fit = client.fit(as_samples(), model="lambert", progress=lambda now: told.append(now.fraction))

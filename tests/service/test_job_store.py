@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 from brdfcore.errors import InvalidValueError
-from service.jobs.store import MOST_CRASHES, MOST_RESTARTS, Attempt, JobStore
+from service.jobs.records import Attempt
+from service.jobs.store import MOST_CRASHES, MOST_RESTARTS, JobStore
 
 
 class Clock:

@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import pytest
 from service_cases import measured_diffuser
@@ -92,11 +91,7 @@ def test_fits_survive_a_killed_server(tmp_path: pathlib.Path) -> None:
         fits = [client.get(fit.id).wait(timeout=60) for fit in (first, second)]
         assert [fit.view.attempts for fit in fits] == [2, 1]
         assert fits[1].status == "converged"
-        assert [fit.id for fit in fits[::-1]] == [item["id"] for item in listed(client)]
-
-
-def listed(client: Client) -> list[dict[str, Any]]:
-    return list(client._send("GET", "/v1/fits").json()["items"])
+        assert [fit.id for fit in fits[::-1]] == [fit.id for fit in client.recent()]
 
 
 def test_sigterm_ends_at_once_and_keeps_the_fits(tmp_path: pathlib.Path) -> None:
@@ -114,7 +109,7 @@ def test_sigterm_ends_at_once_and_keeps_the_fits(tmp_path: pathlib.Path) -> None
 
         waiting = threading.Thread(target=wait)
         waiting.start()
-        until(lambda: [fit["status"] for fit in listed(client)] == ["running"])
+        until(lambda: [fit.status for fit in client.recent()] == ["running"])
         begun = time.monotonic()
         process.send_signal(signal.SIGTERM)
         process.wait(timeout=5)
