@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -13,7 +14,7 @@ from starlette.types import ASGIApp
 
 import brdfcore as bc
 
-from . import errors
+from . import errors, examples
 from .datasets import Datasets
 from .guard import Guard, JsonLines
 from .jobs.dispatcher import Dispatcher
@@ -29,6 +30,12 @@ _log = logging.getLogger("service")
 
 class _App(FastAPI):
     """An application inside the guard, whose 500s carry what every answer does."""
+
+    def openapi(self) -> dict[str, Any]:
+        """The OpenAPI document, with an example for every operation."""
+        if self.openapi_schema is None:
+            self.openapi_schema = examples.shown(super().openapi())
+        return self.openapi_schema
 
     def build_middleware_stack(self) -> ASGIApp:
         """The application that the server calls."""
