@@ -167,19 +167,23 @@ class _OnDemand:
 
     @property
     def ux(self) -> Tensor:
-        return self.hx / (2 * self.h_dot_wo)
+        return self.hx / self.norm
 
     @property
     def uy(self) -> Tensor:
-        return self.hy / (2 * self.h_dot_wo)
+        return self.hy / self.norm
 
     @property
     def uz(self) -> Tensor:
-        return self.hz / (2 * self.h_dot_wo)
+        return self.hz / self.norm
+
+    @cached_property
+    def norm(self) -> Tensor:
+        return torch.sqrt(self.hx.square() + self.hy.square() + self.hz.square())
 
     @cached_property
     def h_dot_wo(self) -> Tensor:
-        return 0.5 * torch.sqrt(self.hx.square() + self.hy.square() + self.hz.square())
+        return 0.5 * self.norm
 
 
 def geometry(wi: Directions, wo: Directions, needs: Iterable[str]) -> Geometry:
