@@ -190,6 +190,7 @@ def geometry(wi: Directions, wo: Directions, needs: Iterable[str]) -> Geometry:
     """The quantities that `needs` names, for directions of one floating dtype; raises for other dtypes and shapes."""
     check_directions("wi", wi)
     check_directions("wo", wo)
+    check_broadcast("wi and wo", wi, wo, field="wo")
     dtype = torch.promote_types(wi.dtype, wo.dtype)
     on_demand = _OnDemand(wi.double(), wo.double(), FLOOR[dtype])
     quantities = {name: getattr(on_demand, name) for name in needs}
@@ -215,6 +216,20 @@ def check_directions(name: str, w: Tensor) -> None:
         raise InvalidValueError(
             f"Expected {name} to be float32 or float64, got {w.dtype}. Convert it with {name}.float().", field=name
         )
+
+
+def check_broadcast(names: str, *tensors: Tensor, field: str) -> None:
+    """Raise InvalidValueError where tensors, in words `names`, have shapes that do not broadcast."""
+    shapes = [tuple(tensor.shape) for tensor in tensors]
+    if len(set(shapes)) > 1:
+        try:
+            torch.broadcast_shapes(*shapes)
+        except RuntimeError:
+            raise InvalidValueError(
+                f"Expected {names} to have shapes that broadcast, got {' and '.join(map(str, shapes))}. "
+                "Make their leading axes equal, or of length 1.",
+                field=field,
+            ) from None
 
 
 def from_angles(theta: Tensor, phi: Tensor) -> Directions:

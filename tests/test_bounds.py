@@ -479,6 +479,24 @@ def test_corners_that_make_no_box_are_refused(low, high, message):
     assert e.value.field == "box"
 
 
+@pytest.mark.parametrize("box", [None, 3.0, "kurt", (torch.zeros(3),), (torch.zeros(3),) * 3, (None, None)], ids=str)
+def test_what_is_no_box_is_refused(box):
+    with pytest.raises(
+        bc.errors.InvalidValueError, match=r"^Expected the box to be two corners, \(low, high\), got "
+    ) as e:
+        bc.bounds.maximum(bc.material("ward"), at(30), box)
+    assert e.value.field == "box"
+
+
+def test_a_box_a_direction_too_few_is_refused():
+    low = torch.zeros(4, 3)
+    with pytest.raises(
+        bc.errors.InvalidValueError, match=r"^Expected wi and the box to have shapes that broadcast, "
+    ) as e:
+        bc.bounds.maximum(bc.material("ward"), at(30).expand(5, 3), (low, low + 1))
+    assert e.value.field == "box"
+
+
 def test_light_that_is_no_direction_is_refused():
     corners = box((-1, -1, 0.5), (1, 1, 1))
     with pytest.raises(bc.errors.InvalidValueError, match="Expected wi to be finite, got nan"):
