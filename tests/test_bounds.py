@@ -453,6 +453,13 @@ def test_the_peak_over_a_rectangle_of_slopes_is_the_largest_value(ax, ay, power)
 # --- refusals --------------------------------------------------------------------------------------------------------
 
 
+def test_a_text_in_the_place_of_a_material_is_refused():
+    expected = r"^Expected material to be a Material, got str\. Make one with bc\.material\(text\)\.$"
+    with pytest.raises(bc.errors.InvalidValueError, match=expected) as e:
+        bc.bounds.maximum("ward", at(30), box((-1, -1, 0.5), (1, 1, 1)))
+    assert e.value.field == "material"
+
+
 def test_a_model_without_a_bound_is_refused(monkeypatch):
     monkeypatch.delitem(bc.bounds.BOUNDS, "ward")
     with pytest.raises(

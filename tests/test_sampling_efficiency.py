@@ -225,6 +225,13 @@ def test_it_says_what_it_cost():
 # --- refusals --------------------------------------------------------------------------------------------------------
 
 
+def test_a_text_in_the_place_of_a_material_is_refused():
+    expected = r"^Expected material to be a Material, got str\. Make one with bc\.material\(text\)\.$"
+    with pytest.raises(bc.errors.InvalidValueError, match=expected) as e:
+        bc.sampling.efficiency("ward", at(30))
+    assert e.value.field == "material"
+
+
 def test_directions_below_the_horizon_are_refused():
     wo = torch.stack([at(30)[0], torch.tensor([1.0, 0.0, 0.0], dtype=torch.float64)])
     with pytest.raises(bc.errors.InvalidValueError, match=r"above the horizon, got \[1\.0, 0\.0, 0\.0\]") as e:

@@ -18,7 +18,7 @@ from torch import Tensor
 from .._types import Directions, Spectrum
 from ..errors import InvalidValueError
 from ..geometry import FLOOR, check_broadcast, check_directions
-from ..models.material import Material
+from ..models.material import Material, check_material
 from .pieces import Interval, faces, middle_of, pieces_of
 from .terms import BOUNDS, OPTIONS
 
@@ -39,6 +39,7 @@ def maximum(material: Material, wi: Directions, box: tuple[Tensor, Tensor]) -> S
     over the hemisphere. The bound is finite for every wi above the horizon (float32 may overflow), and 0 for others.
     Raises InvalidValueError for a model or option that has no bound, and for corners that make no box.
     """
+    check_material(material)
     check_directions("wi", wi)
     low, high = _corners(wi, box)
     for term in material.form.terms:

@@ -169,6 +169,15 @@ class Material(nn.Module):
         return cls(form, values)
 
 
+def check_material(material: object) -> None:
+    """Raise InvalidValueError where it is something else, as a text is."""
+    if not isinstance(material, Material):
+        raise InvalidValueError(
+            f"Expected material to be a Material, got {type(material).__name__}. Make one with bc.material(text).",
+            field="material",
+        )
+
+
 def _number(key: str, number: Number) -> Tensor:
     """A given value in double precision."""
     try:
