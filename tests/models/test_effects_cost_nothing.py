@@ -54,11 +54,13 @@ def operations(compute: Callable[[], object]) -> Operations:
 def of_f(material: bc.Material) -> Operations:
     """What evaluating a material takes: its values, the geometry, the terms and their sum."""
     with torch.no_grad():
+        material.f(WI, WO)  # tables are read once a process
         return operations(lambda: material.f(WI, WO))
 
 
 def of_gradient(material: bc.Material) -> Operations:
     """What evaluating a material and differentiating by all its parameters takes."""
+    material.f(WI, WO)
     return operations(lambda: torch.autograd.grad(material.f(WI, WO).sum(), list(material.parameters())))
 
 
