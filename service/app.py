@@ -18,7 +18,7 @@ from . import errors, examples
 from .datasets import Datasets
 from .guard import Guard, JsonLines
 from .jobs.dispatcher import Dispatcher
-from .jobs.runner import LocalRunner
+from .jobs.runner import LocalRunner, Runner
 from .jobs.store import JobStore
 from .metrics import Metrics
 from .routes import ROUTERS
@@ -26,6 +26,17 @@ from .settings import Settings
 from .state import State
 
 _log = logging.getLogger("service")
+
+
+def _runner(settings: Settings) -> Runner:
+    """What computes: this machine's processes, or a Ray cluster where one is named."""
+    if not settings.ray_address:
+        return LocalRunner(settings.data, settings.fit_memory)
+    from .jobs.ray_runner import RayRunner  # a cluster is rarely there, and Ray is heavy
+
+    return RayRunner(
+        settings.ray_address, settings.data, settings.fit_memory, cpus=settings.ray_cpus, gpus=settings.ray_gpus
+    )
 
 
 class _App(FastAPI):
@@ -51,7 +62,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     async def running(app: FastAPI) -> AsyncIterator[None]:
         datasets = Datasets(chosen.data)
         store = JobStore(chosen.data / "jobs.sqlite3")
-        runner = LocalRunner(chosen.data, chosen.fit_memory)
+        runner = _runner(chosen)
         metrics.watch(store)
 
         def sweep() -> None:

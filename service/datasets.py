@@ -96,6 +96,12 @@ class Datasets:
             shutil.rmtree(folder, ignore_errors=True)
         return len(old)
 
+    def files(self, name: str) -> dict[str, bytes]:
+        """What is kept of a dataset, by its paths under the data folder; nothing where there is none."""
+        if self.get(name) is None:
+            return {}
+        return {f"datasets/{name}/{file.name}": file.read_bytes() for file in (self._kept / name).iterdir()}
+
     def samples(self, request: FitRequest) -> Samples:
         """The samples that a fit's request means, inline or uploaded."""
         if request.samples is not None:

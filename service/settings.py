@@ -26,6 +26,8 @@ class Settings:
                     directions that POST /v1/evaluate takes
     fit_seconds     longest that one attempt at a fit or a table may run [s]
     fit_memory      most memory that one attempt may allocate [bytes]
+    ray_address     of a Ray cluster whose nodes compute instead of this machine's processes; empty for these
+    ray_cpus, ray_gpus   what one job takes of the cluster; fractions share a GPU
     queue_limit     unfinished jobs that one key, or everybody without keys, may have
     keep_days       ended jobs, and datasets that no job is of, are removed after so many days; 0 keeps them for ever
     api_keys        keys that are let in, as their SHA-256; without any, everybody is. The variable holds the keys
@@ -41,6 +43,9 @@ class Settings:
     inline_rows: int = 10_000
     fit_seconds: float = 3600.0
     fit_memory: int = 8 * 2**30
+    ray_address: str = ""
+    ray_cpus: float = 1.0
+    ray_gpus: float = 0.0
     queue_limit: int = 1000
     keep_days: float = 0.0
     api_keys: tuple[str, ...] = field(default=(), repr=False, metadata={"read": hashes})
@@ -52,6 +57,9 @@ class Settings:
                 raise _refused(name, "above 0", getattr(self, name))
         if not 0 <= self.port <= 65535:
             raise _refused("port", "within 0..65535", self.port)
+        for name in ("ray_cpus", "ray_gpus"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise _refused(name, "0 or more", getattr(self, name))
         if not 0 <= self.keep_days < math.inf:
             raise _refused("keep_days", "0 or more", self.keep_days)
         if self.log_level not in LOG_LEVELS:

@@ -10,14 +10,9 @@ import time
 
 import pytest
 from service_cases import measured_diffuser
-from service_process import SLOW, server, session_ids, until
+from service_process import COUNTING, SLOW, server, session_ids, until
 
 JOBS, KILLS, SERVERS = 120, 100, 25  # of the kills, so many hit the server
-COUNTING = """
-CREATE TABLE commits (job TEXT NOT NULL);
-CREATE TRIGGER committed AFTER UPDATE OF status ON jobs WHEN NEW.status = 'succeeded'
-BEGIN INSERT INTO commits VALUES (NEW.id); END;
-"""
 
 
 @pytest.mark.full
