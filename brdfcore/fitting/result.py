@@ -46,6 +46,10 @@ class Fit:
     status: str
     message: str
     undetermined: tuple[str, ...]
+    combinations: tuple[dict[str, float], ...]
+    singular_values: tuple[float, ...]
+    covariance: Tensor
+    covariance_keys: tuple[str, ...]
     choices: tuple[str, ...]
     fixed: tuple[str, ...]
     gray: tuple[str, ...]

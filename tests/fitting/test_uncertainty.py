@@ -10,7 +10,7 @@ from fit_cases import TRUE, measured_from
 import brdfcore as bc
 from brdfcore.demo import DATA, MATERIAL, MODEL, linoleum
 from brdfcore.fitting import fit_batch
-from brdfcore.fitting.uncertainty import t_quantile
+from brdfcore.fitting.student import t_quantile
 from brdfcore.geometry import geometry
 
 TABLE_1 = {"ward_bounded.rs": 0.04982, "ward_bounded.a": 0.03172, "lambert.kd": 0.175 - 0.04982}
@@ -48,7 +48,7 @@ def test_each_channel_has_the_noise_of_its_own() -> None:
     """Three channels whose noise differs tenfold: their own kd's intervals differ as much."""
     samples = measured_from(TRUE)
     noise = torch.randn(samples.values.shape, generator=torch.Generator().manual_seed(8), dtype=torch.float64)
-    noisier = samples.values + noise * torch.tensor([0.01, 0.1, 1.0]) / samples.wi[:, 2:]
+    noisier = samples.values + noise * torch.tensor([0.005, 0.05, 0.5]) / samples.wi[:, 2:]
     fit = bc.fit(bc.Samples(samples.wi, samples.wo, noisier), "lambert + ward_bounded(isotropic)")
     errors = fit.standard_errors["lambert.kd"]
     assert 5 < float(errors[1] / errors[0]) < 12
