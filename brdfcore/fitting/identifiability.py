@@ -112,7 +112,7 @@ def is_suspect(matrix: Tensor, level: Tensor, spectrum: Spectrum, lengths: Tenso
     diagonal, noise = (m.diagonal(dim1=-2, dim2=-1) for m in (matrix, level))
     alone = (spectrum.scale > 0) & (LENGTH * noise >= (lengths * diagonal).square())
     spread = spectrum.covariance(level, torch.eye(len(lengths), dtype=torch.float64)) / _outer(lengths)
-    weak = LENGTH * torch.linalg.eigvalsh(spread)[..., -1] >= 1
+    weak: Tensor = LENGTH * torch.linalg.eigvalsh(spread)[..., -1] >= 1
     return weak | (alone | spectrum.silent).any(-1)
 
 
@@ -141,15 +141,13 @@ def unseen(matrix: Tensor, level: Tensor, asked: Tensor, blind: Tensor, lengths:
     none = ~taking_part.any(-1)
     taking_part[none, (change / lengths).argmax(-1)[none]] = True
     own = unit[alone]
-    return Unseen(
-        torch.cat([own.T, weak], dim=1),
-        torch.cat([own * lengths, directions]),
-        torch.cat([own.bool(), taking_part]),
-    )
+    taking_part = torch.cat([own.bool(), taking_part])
+    order = taking_part.to(torch.uint8).argmax(-1).argsort(stable=True)  # by the first value that takes part
+    return Unseen(torch.cat([own.T, weak], dim=1), torch.cat([own * lengths, directions])[order], taking_part[order])
 
 
 def singular_values(matrix: Tensor, asked: Tensor, blind: Tensor) -> tuple[float, ...]:
-    """Those of one material's Jacobian over what is asked about, its columns of unit length, falling; 0 for the blind."""
+    """Those of one material's Jacobian over what is asked about, columns of unit length, falling; 0 for the blind."""
     seen = asked & ~blind
     spectrum = Spectrum.of(matrix[seen][:, seen].unsqueeze(0), seen[seen].unsqueeze(0))
     values = spectrum.values[0].clamp(min=0).sqrt().flip(0).tolist()

@@ -25,7 +25,9 @@ class Noise(NamedTuple):
     sum: Tensor  # (M, D, D), B above without what is infinite
     level: Tensor  # (M, D, D), B for the channel's mean noise where a sample has a leverage above 1/2
     unknown: Tensor  # (M, D) bool, values that a sample of infinite variance reaches
-    freedom: Tensor  # (M, D), degrees of freedom of each variance (Satterthwaite's, as Bell and McCaffrey 2002 use them)
+    freedom: (
+        Tensor  # (M, D), degrees of freedom of each variance (Satterthwaite's, as Bell and McCaffrey 2002 use them)
+    )
 
 
 def is_known(problem: Problem) -> bool:

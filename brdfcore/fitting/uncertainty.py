@@ -78,7 +78,9 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     if bool(suspect.any()):
         spectrum = Spectrum.of(matrix, ~held & ~blind)
     if bool(suspect.any()) and not is_known(problem):
-        again = noise(problem, x[suspect], spectrum.inverse()[suspect], which[suspect], (kept @ spectrum.inverse())[suspect])
+        again = noise(
+            problem, x[suspect], spectrum.inverse()[suspect], which[suspect], (kept @ spectrum.inverse())[suspect]
+        )
         unknown[suspect], degrees[suspect] = again.unknown, again.freedom
     covariance = spectrum.covariance(sums.sum, kept) + over_range
     told = ~(held | undetermined) & ((freedom > 0) | is_known(problem)).unsqueeze(-1)

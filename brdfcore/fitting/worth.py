@@ -15,6 +15,7 @@ from .levenberg_marquardt import Outcome
 from .losses import LOSSES
 from .problem import Problem
 from .result import Cost, Fit
+from .support import supports, warnings
 from .uncertainty import Uncertainty, uncertainty
 
 
@@ -33,6 +34,7 @@ def fits(
     if problem.data.sigma is not None:
         chi_square = ((f - problem.data.y) / problem.data.sigma).square().sum((1, 2)).tolist()
     freedom, minima, ends = known.freedom.tolist(), outcome.loss.tolist(), outcome.converged.tolist()
+    support = supports(fitted[0])
     found = []
     for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
         error = every_error[row]
@@ -57,6 +59,7 @@ def fits(
                 objective=minima[row] if weighed or plan.robust else error[problem.loss_kind.name],
                 status=("undetermined" if undetermined else "converged") if ends[row] else "stopped_early",
                 message=_message(problem, known, row, undetermined, converged=ends[row], weighed=weighed),
+                warnings=warnings(plan, support, samples, problem.loss_kind.name),
                 choices=plan.choices,
                 fixed=tuple(sorted(plan.fixed)),
                 gray=tuple(sorted(plan.gray)),
@@ -153,8 +156,8 @@ def _message(
         parts.append(f"The data do not determine {', '.join(alone)}; no number is given for what they leave free.")
     if together:
         parts.append(
-            f"The data do not determine {', nor '.join(together)}, but only what they make together; no number is "
-            "given for any of them. Fix one of each, or measure where they differ."
+            f"The data do not determine {', nor '.join(together)} one by one, only together; no number is given for "
+            "any of them. Fix one of them, or measure where their effects differ."
         )
     if problem.data.sigma is None and int(known.freedom[row]) <= 0:
         parts.append("There are no more samples than values, so no interval can be given.")
