@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from ..errors import SamplesError
 from .identifiability import LENGTH, RANK, Spectrum, Unseen, is_suspect, magnitudes, ranges, singular_values, unseen
 from .noise import is_known, noise
 from .problem import Gram, Problem
@@ -44,7 +45,10 @@ class Uncertainty:
 
 
 def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncertainty:
-    """The uncertainties of the optima x (M, D), one a material of the problem, whose normal equations may be known."""
+    """The uncertainties of the optima x (M, D), one a material of the problem, whose normal equations may be known.
+
+    Raises SamplesError where the loss of the samples leaves the type.
+    """
     which = torch.arange(len(x))
     counted = (problem.data.root_weight.expand_as(problem.data.y) > 0).sum((1, 2))
     if problem.size == 0:
@@ -52,6 +56,13 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
         nothing = (Unseen.nothing(0),) * len(x)
         return Uncertainty(x, x, x, square, x, none, none, counted, nothing, ((),) * len(x))
     gram = gram or problem.gram(x, which)
+    if not all(bool(part.isfinite().all()) for part in (x, gram.gradient, gram.matrix)):
+        size = problem.data.y.abs()
+        raise SamplesError(
+            "Expected values to be of a size whose squares a double holds under this loss, got magnitudes from "
+            f"{float(size.min()):.3g} to {float(size.max()):.3g}. Choose another unit or loss.",
+            field="values",
+        )
     matrix, diagonal = gram.matrix, gram.matrix.diagonal(dim1=-2, dim2=-1)
     blind = diagonal <= (_SILENT**2 * problem.squares()).unsqueeze(-1)
     pressed = gram.gradient.abs() > _PRESSED * (diagonal * gram.loss.unsqueeze(-1)).sqrt()
