@@ -160,6 +160,10 @@ class FitResult(JobResult[FitView]):
         theta_i_deg: Sequence[float] = (),
         channel: str | None = None,
     ) -> bytes:
-        """The plot of that name, as the bytes of an SVG or PNG file."""
-        asked = {"scale": scale, "theta_i_deg": list(theta_i_deg)} | ({"channel": channel} if channel else {})
+        """The plot of that name, lobes, albedo or residuals, as the bytes of an SVG or PNG file.
+
+        `scale` and `theta_i_deg` are for lobes, `channel` is for all.
+        """
+        given = {"scale": scale if scale != "linear" else None, "theta_i_deg": list(theta_i_deg), "channel": channel}
+        asked = {name: value for name, value in given.items() if value}
         return self._send("GET", f"/v1/fits/{self.id}/plots/{name}.{kind}", params=asked).content

@@ -28,15 +28,17 @@ def command(
     angle_unit: Annotated[str | None, typer.Option(help="degrees or radians, where the file does not say.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Write the lobe plot to this .svg or .png file.")] = None,
+    residuals: Annotated[Path | None, typer.Option(help="Write the residuals by angle to this .svg or .png.")] = None,
     scale: Annotated[str, typer.Option(help="Of the plot's radius: linear, cube_root or log.")] = "linear",
     channel: Annotated[str | None, typer.Option(help="The channel that is plotted; else the brightest.")] = None,
 ) -> None:
     """Fit a material to a measured file; print parameters with 95 % intervals, errors and cost."""
     import brdfcore as bc
 
-    if plot is not None:  # what cannot be drawn is refused before the work, not after it
-        bc.plots.kind_of(plot)
-        bc.plots.check_scale(scale)
+    for path in (plot, residuals):  # what cannot be drawn is refused before the work, not after it
+        if path is not None:
+            bc.plots.kind_of(path)
+            bc.plots.check_scale(scale)
     samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit)
 
     def run(progress: "Callable[[Progress], None] | None") -> "Fit":
@@ -57,6 +59,9 @@ def command(
     if plot is not None:
         figure = bc.plots.lobes(result.material, samples, scale=scale, channel=channel)
         typer.echo(f"Lobe plot: {bc.plots.save(figure, plot)}", err=as_json)
+    if residuals is not None:
+        figure = bc.plots.residuals(result, channel=channel)
+        typer.echo(f"Residuals: {bc.plots.save(figure, residuals)}", err=as_json)
 
 
 def _pair(text: str) -> tuple[str, float]:

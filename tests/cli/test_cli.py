@@ -43,12 +43,14 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 
 
 def test_fit_prints_the_report_and_writes_the_plot(run: Run, tmp_path: pathlib.Path) -> None:
-    done = run("fit", DATA, "--model", MODEL, "--plot", "lobes.svg")
+    done = run("fit", DATA, "--model", MODEL, "--plot", "lobes.svg", "--residuals", "residuals.png")
     assert done.returncode == 0, done.stderr
     assert "ward_bounded.rs" in done.stdout
     assert "95 % interval" in done.stdout
     assert "Lobe plot: lobes.svg" in done.stdout
     assert (tmp_path / "lobes.svg").read_text().lstrip().startswith("<?xml")
+    assert "Residuals: residuals.png" in done.stdout
+    assert (tmp_path / "residuals.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_fit_json_is_the_librarys_result(run: Run) -> None:
@@ -88,6 +90,7 @@ MISTAKES = {
     "unknown model": (("fit", DATA, "--model", "lambrt"), "Did you mean 'lambert'"),
     "fixed without a number": (("fit", DATA, "--model", "lambert", "--fixed", "lambert.kd"), "KEY=NUMBER"),
     "plot suffix": (("fit", DATA, "--model", "lambert", "--plot", "x.pdf"), ".svg or .png"),
+    "residuals suffix": (("fit", DATA, "--model", "lambert", "--residuals", "x.pdf"), ".svg or .png"),
     "plot scale": (("fit", DATA, "--model", "lambert", "--plot", "x.svg", "--scale", "cubic"), "a scale"),
     "plot folder": (("fit", DATA, "--model", "lambert", "--plot", "nosuch/x.svg"), "folder to exist"),
     "demo's plot": (("demo", "--plot", "d.pdf"), ".svg or .png"),

@@ -10,7 +10,9 @@ from service_cases import KD, csv_file, measured_diffuser
 from starlette.testclient import TestClient
 
 import brdfcore as bc
+from brdfcore.fitting.result import STATUSES
 from service.app import create_app
+from service.schemas import FitOutcome
 from service.settings import Settings
 
 Body = dict[str, Any]
@@ -206,8 +208,9 @@ def test_a_finished_fit_cannot_be_cancelled(http: TestClient, fit: dict[str, Any
     assert "succeeded" in answer.json()["detail"]
 
 
-def test_lobes_are_drawn_as_svg_and_png(http: TestClient, fit: dict[str, Any]) -> None:
-    path = f"/v1/fits/{fit['id']}/plots/lobes"
+@pytest.mark.parametrize("plot", ["lobes", "residuals"])
+def test_plots_are_drawn_as_svg_and_png(http: TestClient, fit: dict[str, Any], plot: str) -> None:
+    path = f"/v1/fits/{fit['id']}/plots/{plot}"
     svg, png = http.get(f"{path}.svg"), http.get(f"{path}.png")
     assert svg.headers["content-type"].startswith("image/svg+xml")
     assert b"<svg" in svg.content
@@ -243,6 +246,28 @@ def test_a_plot_that_cannot_be_drawn_is_a_problem(
 ) -> None:
     answer = http.get(f"/v1/fits/{fit['id']}/plots/lobes.svg", params=query)
     assert (answer.status_code, answer.json()["field"]) == (422, field)
+
+
+def test_residuals_of_a_channel_that_is_not_there_are_a_problem(http: TestClient, fit: dict[str, Any]) -> None:
+    path = f"/v1/fits/{fit['id']}/plots/residuals.svg"
+    assert b"incidence" in http.get(path, params={"channel": "value"}).content
+    answer = http.get(path, params={"channel": "red"})
+    assert (answer.status_code, answer.json()["field"]) == (422, "channel")
+
+
+def test_what_the_data_leave_free_is_in_the_answer(http: TestClient) -> None:
+    """The sample was never turned: a width across has no number, and the status is a word that clients know."""
+    body = {"samples": measured_diffuser(), "model": "lambert + ward_bounded(anisotropic)"}
+    result = http.post("/v1/fits", json=body, headers={"prefer": "wait=20"}).json()["result"]
+    assert result["status"] == "undetermined"
+    assert result["undetermined"] == ["ward_bounded.ay with ward_bounded.rs"]
+    assert result["parameters"]["ward_bounded.ay"] is None
+    assert set(result["combinations"][0]) == {"ward_bounded.ay", "ward_bounded.rs"}
+    assert any("azimuth was not observed" in sentence for sentence in result["warnings"])
+    assert len(result["covariance"]) == len(result["covariance_keys"])
+    FitOutcome.model_validate(result)
+    known = FitOutcome.model_json_schema()["properties"]["status"]["enum"]
+    assert tuple(known) == STATUSES
 
 
 def test_a_plot_must_be_acceptable(http: TestClient, fit: dict[str, Any]) -> None:
@@ -298,6 +323,8 @@ def test_openapi_has_every_route_and_its_errors(http: TestClient) -> None:
         "/v1/fits/{fit_id}/plots/albedo.svg": ["get"],
         "/v1/fits/{fit_id}/plots/lobes.png": ["get"],
         "/v1/fits/{fit_id}/plots/lobes.svg": ["get"],
+        "/v1/fits/{fit_id}/plots/residuals.png": ["get"],
+        "/v1/fits/{fit_id}/plots/residuals.svg": ["get"],
         "/v1/models": ["get"],
     }
     submit = paths["/v1/fits"]["post"]
