@@ -3,9 +3,9 @@
     J^T J = S^-1 (V diag(s^2) V^T) S^-1,    S scales each column of the Jacobian J to unit length
 
 The singular values s are pure numbers; a direction whose s is 0 to rounding changes no residual. Noise hides others: a
-direction counts as not determined where its 95 % interval would be as long as the range that is searched along it, a
-factor of 300 for a width, all of [0, 1] for a reflectance or alpha. A value takes part in such a direction if, over
-that length, it changes by half of itself or more (a width by exp(1/2)) and by more than the length of its interval
+direction counts as not determined where, along its 95 % interval, some value would cross all of the range in which it
+is searched, a factor of 300 for a width, [0, 1] for a reflectance or alpha. A value takes part in such a direction if,
+over that length, it changes by half of itself or more (a width by exp(1/2)) and by more than the length of its interval
 would be if the others were known. Directions are combined until each has as few such values as possible.
 """
 
@@ -21,6 +21,7 @@ from .student import NORMAL_QUANTILE
 RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding: J's own digits, squared
 LENGTH = (2 * NORMAL_QUANTILE) ** 2  # the square of an interval's length over its standard error
 _SHARE = 0.5  # of itself that a value changes by where it takes part
+_LISTED = 3  # channels of a key that take part and are named one by one
 _ROUNDING = 1e-6  # of its range: a smaller part in a direction is rounding
 
 
@@ -72,7 +73,7 @@ class Unseen(NamedTuple):
     """What the data of one material leave free: k directions."""
 
     basis: Tensor  # (D, k), orthonormal in raw values counted in search ranges
-    directions: Tensor  # (k, D) raw; they span the same, and each has length 1 in search ranges
+    directions: Tensor  # (k, D) raw; they span the same, and each takes one value across its search range
     taking_part: Tensor  # (k, D) bool
 
     @classmethod
@@ -83,9 +84,10 @@ class Unseen(NamedTuple):
 
     def kept(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
         """What keeps all but these directions of raw values, and their own covariance, over search ranges; (D, D)."""
-        away = self.basis @ self.basis.T
         unit = torch.eye(len(lengths), dtype=torch.float64)
-        return unit - lengths.unsqueeze(-1) * away / lengths, _outer(lengths) * away / LENGTH
+        across = self.basis / self.basis.abs().max(0, keepdim=True).values if self.basis.shape[1] else self.basis
+        away, over_range = self.basis @ self.basis.T, across @ across.T
+        return unit - lengths.unsqueeze(-1) * away / lengths, _outer(lengths) * over_range / LENGTH
 
 
 def ranges(problem: Problem) -> Tensor:
@@ -111,9 +113,8 @@ def is_suspect(matrix: Tensor, level: Tensor, spectrum: Spectrum, lengths: Tenso
     """Whether a material's data may leave some direction of the spectrum free, (M,) bool."""
     diagonal, noise = (m.diagonal(dim1=-2, dim2=-1) for m in (matrix, level))
     alone = (spectrum.scale > 0) & (LENGTH * noise >= (lengths * diagonal).square())
-    spread = spectrum.covariance(level, torch.eye(len(lengths), dtype=torch.float64)) / _outer(lengths)
-    weak: Tensor = LENGTH * torch.linalg.eigvalsh(spread)[..., -1] >= 1
-    return weak | (alone | spectrum.silent).any(-1)
+    spread = spectrum.covariance(level, torch.eye(len(lengths), dtype=torch.float64)).diagonal(dim1=-2, dim2=-1)
+    return (alone | spectrum.silent | (LENGTH * spread >= lengths.square())).any(-1)
 
 
 def unseen(matrix: Tensor, level: Tensor, asked: Tensor, blind: Tensor, lengths: Tensor, sizes: Tensor) -> Unseen:
@@ -133,8 +134,10 @@ def unseen(matrix: Tensor, level: Tensor, asked: Tensor, blind: Tensor, lengths:
         silent = torch.linalg.qr(silent)[0]
         spread = spread + 10 * (1 + spread.trace()) * silent @ silent.T
     variances, vectors = torch.linalg.eigh(spread)
-    weak = vectors[:, LENGTH * variances >= 1]
-    directions = torch.nn.functional.normalize(_sparse(weak.T), dim=-1) * lengths
+    weak = vectors[:, LENGTH * variances * vectors.square().max(0).values >= 1]
+    directions = _sparse(weak.T)
+    if len(directions):
+        directions = directions / directions.abs().max(-1, keepdim=True).values * lengths
     change = directions.abs()
     least = torch.maximum(_SHARE * torch.minimum(lengths, sizes), LENGTH**0.5 * alone_error)
     taking_part = rest & (change >= torch.maximum(least, _ROUNDING * lengths))
@@ -179,28 +182,52 @@ def named(
     """What is not determined in words, and the combinations as the changes of natural values along them.
 
     A value alone is its key, or key[channel] where other channels determine theirs; a combination is such names in the
-    order of the alphabet, joined by " with ". Channels that share a kind of combination are named once. A change is in
-    the parameter's own unit, and a combination's have length 1; `chain` (D,) makes them of the raw ones.
+    order of the alphabet, joined by " with ", and where more than three channels of a key take part, but not all, it
+    says in how many. Channels that share a kind of combination are named once. A change is in the parameter's own unit,
+    and a combination's have length 1; `chain` (D,) makes them of the raw ones.
     """
     key_of = [key for key, at in problem.slices.items() for _ in range(at.start, at.stop)]
-    kinds: dict[tuple[str, ...], list[list[int]]] = {}
+    kinds: dict[tuple[tuple[str, ...], bool], list[list[int]]] = {}
     combinations: list[dict[str, float]] = []
     for direction, part in zip(found.directions, found.taking_part, strict=True):
         at = part.nonzero()[:, 0].tolist()
-        kinds.setdefault(tuple(sorted({key_of[position] for position in at})), []).append(at)
+        kinds.setdefault((tuple(sorted({key_of[position] for position in at})), len(at) > 1), []).append(at)
         if len(at) > 1:
             change = direction[at] * chain[at]
             weights = (change / change.norm() * change[change.abs().argmax()].sign()).tolist()
             names = [name_of(problem, position, channels) for position in at]
             combinations.append(dict(sorted(zip(names, weights, strict=True))))
     words: list[str] = []
-    for keys, several in kinds.items():
-        union = {position for at in several for position in at}
-        if all(set(range(problem.slices[key].start, problem.slices[key].stop)) <= union for key in keys):
-            words.append(" with ".join(keys))
-        else:
-            words += [" with ".join(sorted(name_of(problem, position, channels) for position in at)) for at in several]
+    for (keys, together), several in kinds.items():
+        union = sorted({position for at in several for position in at})
+        if not together or all(_taken(problem, key, union) == _all(problem, key) for key in keys):
+            several = [union]
+        words += [word for at in several for word in _words(problem, keys, at, channels, together=together)]
     return tuple(words), tuple(combinations)
+
+
+def _all(problem: Problem, key: str) -> list[int]:
+    return list(range(problem.slices[key].start, problem.slices[key].stop))
+
+
+def _taken(problem: Problem, key: str, positions: Sequence[int]) -> list[int]:
+    return [position for position in _all(problem, key) if position in positions]
+
+
+def _words(
+    problem: Problem, keys: Sequence[str], positions: Sequence[int], channels: Sequence[str], *, together: bool
+) -> list[str]:
+    """The values at these positions: one name for what they make together, or the names of each alone."""
+    names: list[str] = []
+    for key in keys:
+        taken = _taken(problem, key, positions)
+        if taken == _all(problem, key):
+            names.append(key)
+        elif together and len(taken) > _LISTED:
+            names.append(f"{key} in {len(taken)} channels")
+        else:
+            names += [name_of(problem, position, channels) for position in taken]
+    return [" with ".join(names)] if together else names
 
 
 def name_of(problem: Problem, position: int, channels: Sequence[str]) -> str:

@@ -195,3 +195,21 @@ def test_json_holds_covariances_of_up_to_32_values() -> None:
     result = json.loads(json.dumps(many.to_dict(), allow_nan=False))
     assert result["covariance"] is result["correlations"] is None
     assert len(result["covariance_keys"]) == 33
+
+
+def test_of_many_channels_the_number_that_takes_part_is_named() -> None:
+    """Eight channels of which five have a lobe: the others' ks is 0 whatever f0 is."""
+    text = f"lambert(kd=0.2) + kurt_plausible(isotropic, ks={[0.4] * 5 + [0.0] * 3}, f0=0.1, m=0.15)"
+    fit = bc.fit(steep_less(text, 30), "lambert + kurt_plausible")
+    assert fit.undetermined == ("kurt_plausible.f0 with kurt_plausible.ks in 5 channels",)
+    assert fit.parameters["kurt_plausible.ks"].isnan().tolist() == [True] * 5 + [False] * 3
+    assert len(fit.combinations[0]) == 6
+
+
+def test_many_channels_do_not_make_a_direction_long() -> None:
+    """In 31 channels, each ks known to 0.1 along one direction: no value crosses its range, so all are told."""
+    text = f"lambert(kd=0.1) + ggx(isotropic, schlick, ks={[0.5] * 31}, f0=0.1, a=0.15)"
+    fit = bc.fit(steep_less(text, 42), "lambert + ggx(isotropic, schlick)")
+    lengths = fit.intervals["ggx.ks"].diff()
+    assert fit.status == "converged"
+    assert 0.1 < float(lengths.median()) < 0.5
