@@ -6,6 +6,20 @@ from .losses import LOSSES
 from .plan import OPTIMIZERS, check
 from .result import Cost, Fit
 from .robust import ROBUST
+from .support import Support, supports
 from .worth import errors
 
-__all__ = ["LOSSES", "OPTIMIZERS", "ROBUST", "Cost", "Fit", "Progress", "check", "errors", "fit", "fit_batch"]
+__all__ = [
+    "LOSSES",
+    "OPTIMIZERS",
+    "ROBUST",
+    "Cost",
+    "Fit",
+    "Progress",
+    "Support",
+    "check",
+    "errors",
+    "fit",
+    "fit_batch",
+    "supports",
+]
