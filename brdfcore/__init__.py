@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
     from .energy.tables import AlbedoTable, albedo_table
-    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Support, fit, fit_batch, supports
+    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Support, fit, fit_batch, held_out, supports
     from .formats import FORMATS, read
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
@@ -57,6 +57,7 @@ __all__ = [
     "fit",
     "fit_batch",
     "hard_cases",
+    "held_out",
     "hemispherical_albedo",
     "material",
     "plots",
@@ -71,7 +72,18 @@ _MODULES = {
     ".energy.certificate": ("Certificate", "certify"),
     ".energy.hemispherical": ("hemispherical_albedo",),
     ".energy.tables": ("AlbedoTable", "albedo_table"),
-    ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "Support", "fit", "fit_batch", "supports"),
+    ".fitting": (
+        "LOSSES",
+        "OPTIMIZERS",
+        "ROBUST",
+        "Fit",
+        "Progress",
+        "Support",
+        "fit",
+        "fit_batch",
+        "held_out",
+        "supports",
+    ),
     ".formats": ("FORMATS", "read"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),

@@ -1,6 +1,7 @@
 """Fits of materials to measured samples."""
 
 from ._fit import Progress, fit
+from ._held_out import HeldOut, held_out
 from .batch import fit_batch
 from .losses import LOSSES
 from .plan import OPTIMIZERS, check
@@ -15,11 +16,13 @@ __all__ = [
     "ROBUST",
     "Cost",
     "Fit",
+    "HeldOut",
     "Progress",
     "Support",
     "check",
     "errors",
     "fit",
     "fit_batch",
+    "held_out",
     "supports",
 ]

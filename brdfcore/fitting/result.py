@@ -11,6 +11,7 @@ from torch import Tensor
 from ..formats.samples import Samples
 from ..models.form import Form
 from ..models.material import Material
+from .plan import Plan
 
 STATUSES = ("converged", "undetermined", "stopped_early")
 _MOST = 32  # values whose covariances JSON holds; those of more are in `Fit.covariance` alone
@@ -33,7 +34,7 @@ class Cost:
 class Fit:
     """What `bc.fit` returns.
 
-    form, values, samples: what was fitted, the best values, stored parameters only, and to what.
+    plan, form, values, samples: what was asked, fitted, the best values, stored parameters only, and to what.
     parameters, standard_errors: key -> () or (C,); intervals: key -> (2,) or (C, 2), 95 %. NaN stands where there is no
     number to give: in an interval for a value that was fixed or lies on an end of its box, and everywhere for one
     that the data leave undetermined. `objective` is the loss that was minimised: chi-square where the samples' sigma
@@ -49,6 +50,7 @@ class Fit:
     warnings            what the data's directions and values cannot show of this model, a sentence each (support.py)
     """
 
+    plan: Plan
     form: Form
     values: dict[str, Tensor]
     samples: Samples

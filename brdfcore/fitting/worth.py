@@ -43,6 +43,7 @@ def fits(
         certain = known.covariance[row].diagonal().isfinite()
         found.append(
             Fit(
+                plan=plan,
                 form=plan.form,
                 values={key: value[row].reshape(plan.start[key].shape) for key, value in values.items()},
                 samples=samples,

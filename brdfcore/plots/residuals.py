@@ -10,7 +10,6 @@ tenths of the samples, where there are enough: noise scatters about 0, a wrong s
 triangles on the edge.
 """
 
-import itertools
 import math
 import textwrap
 from typing import TYPE_CHECKING, Any
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import torch
 from torch import Tensor
 
+from ..fitting.incidences import incidences
 from ..fitting.losses import Scales
 from ._figure import COLOURS, new_figure
 from .lobes import drawn_channel
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from ..formats.samples import Samples
     from ..models.material import Material
 
-_PANELS = 6
 _MOST = 20_000  # samples that are drawn
 _MANY = 1000  # points that an SVG draws one by one; more become a picture in it
 _MEDIANS = 10  # on a line, each of at least as many samples
@@ -70,20 +69,6 @@ def _signed_theta_o(samples: "Samples") -> Tensor:
     return torch.where((samples.wi[:, :2] * samples.wo[:, :2]).sum(-1) > 0, -theta, theta)
 
 
-def _groups(theta_i: Tensor) -> list[tuple[str, Tensor]]:
-    """The panels' titles and which samples (N,) they show: each angle of incidence [deg], or six bands of them."""
-    whole = theta_i.round()
-    found = whole.unique()
-    if len(found) <= _PANELS:
-        return [(f"incidence {float(angle):g}°", whole == angle) for angle in found]
-    edges = torch.quantile(theta_i, torch.linspace(0, 1, _PANELS + 1, dtype=theta_i.dtype)).round().unique()
-    edges[0], edges[-1] = theta_i.min().floor(), theta_i.max().ceil()
-    return [
-        (f"incidence {float(low):g}° to {float(high):g}°", (theta_i >= low) & ((theta_i < high) | (high == edges[-1])))
-        for low, high in itertools.pairwise(edges)
-    ]
-
-
 def _medians(x: Tensor, y: Tensor) -> tuple[list[float], list[float]]:
     """Medians of y over tenths of the samples in the order of x; none where there are too few."""
     if len(x) < _MEDIANS**2:
@@ -93,11 +78,10 @@ def _medians(x: Tensor, y: Tensor) -> tuple[list[float], list[float]]:
 
 
 def _draw(samples: "Samples", residual: Tensor, title: str, notes: list[str]) -> "Figure":
-    theta_i = torch.rad2deg(torch.atan2(torch.hypot(samples.wi[:, 0], samples.wi[:, 1]), samples.wi[:, 2]))
     half = samples.wi + samples.wo
     theta_h = torch.rad2deg(torch.atan2(torch.hypot(half[:, 0], half[:, 1]), half[:, 2]))
     theta_o = _signed_theta_o(samples)
-    groups = _groups(theta_i)
+    groups = [(group.title, group.chosen) for group in incidences(samples)]
     columns = {1: 1, 2: 2, 4: 2}.get(len(groups), 3)
     rows = math.ceil(len(groups) / columns)
     names = [
