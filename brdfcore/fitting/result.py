@@ -168,6 +168,8 @@ def _report(result: dict[str, Any], correlated: list[str]) -> str:
         lines.append("chi-square {:.6g} for {} degrees of freedom".format(*result["chi_square"]))
     if result["undetermined"]:
         lines.append("not determined by the data: " + ", ".join(result["undetermined"]))
+        singular = result["singular_values"]
+        lines.append(f"singular values of the scaled Jacobian: {singular[0]:.3g} down to {singular[-1]:.3g}")
     if correlated:
         lines.append("strongly correlated: " + ", ".join(correlated))
     lines += [f"note: {sentence}" for sentence in result["warnings"]]

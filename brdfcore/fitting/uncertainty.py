@@ -38,6 +38,7 @@ class Uncertainty:
     covariance: Tensor  # (M, D, D), natural units
     chain: Tensor  # (M, D), derivatives of the natural values by the raw ones
     undetermined: Tensor  # (M, D) bool
+    vague: Tensor  # (M, D) bool, with an interval that is as long as the range that is searched
     held: Tensor  # (M, D) bool
     freedom: Tensor  # (M,) residuals that weigh anything, less the directions that are determined
     unseen: tuple[Unseen, ...]  # one a material
@@ -54,7 +55,7 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     if problem.size == 0:
         none, square = x.bool(), x.new_zeros(len(x), 0, 0)
         nothing = (Unseen.nothing(0),) * len(x)
-        return Uncertainty(x, x, x, square, x, none, none, counted, nothing, ((),) * len(x))
+        return Uncertainty(x, x, x, square, x, none, none, none, counted, nothing, ((),) * len(x))
     gram = gram or problem.gram(x, which)
     if not all(bool(part.isfinite().all()) for part in (x, gram.gradient, gram.matrix)):
         size = problem.data.y.abs()
@@ -98,13 +99,14 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     variance = torch.where(unknown, math.inf, covariance.diagonal(dim1=-2, dim2=-1).clamp(min=0))
     error = torch.where(told, variance.sqrt(), math.nan)
     factor = torch.full_like(error, NORMAL_QUANTILE) if is_known(problem) else t_quantile(degrees)
+    vague = 2 * factor * error >= lengths
     chain = _chain(problem, x)
     finite = error.isfinite()
     both = finite.unsqueeze(-1) & finite.unsqueeze(-2)
     covariance = torch.where(both, chain.unsqueeze(-1) * covariance * chain.unsqueeze(-2), math.nan)
     values = tuple(singular_values(*each) for each in zip(matrix, ~held, blind, strict=True))
     ends = _natural(problem, x, error, factor, chain)
-    return Uncertainty(*ends, covariance, chain, undetermined, held, freedom, tuple(found), values)
+    return Uncertainty(*ends, covariance, chain, undetermined, vague, held, freedom, tuple(found), values)
 
 
 def _loose(problem: Problem, gram: Gram, spectrum: Spectrum, level: Tensor, lengths: Tensor) -> Tensor:

@@ -160,6 +160,11 @@ def _message(
             f"The data do not determine {', nor '.join(together)} one by one, only together; no number is given for "
             "any of them. Fix one of them, or measure where their effects differ."
         )
+    vague = [key for key, at in problem.slices.items() if bool(known.vague[row, at].any())]
+    if vague:
+        parts.append(
+            f"Few samples decide {', '.join(vague)}, so an interval there is as long as the range that is searched."
+        )
     if problem.data.sigma is None and int(known.freedom[row]) <= 0:
         parts.append("There are no more samples than values, so no interval can be given.")
     if weighed:

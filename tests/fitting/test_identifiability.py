@@ -58,6 +58,7 @@ def test_an_anisotropic_lobe_on_isotropic_data_is_determined_only_together(noise
     for key in ("ward_bounded.ay", "ward_bounded.rs"):
         assert bool(fit.parameters[key].isnan().all() and fit.intervals[key].isnan().all())
     assert fit.singular_values[-1] < 1e-6 < 0.1 < fit.singular_values[-2]
+    assert "\nsingular values of the scaled Jacobian: 1.7" in fit.report()
     values = fit.values["ward_bounded.rs"].tolist()
     (weights,) = fit.combinations
     relative = [weights[f"ward_bounded.rs[{c}]"] / v for c, v in zip("rgb", values, strict=True)]

@@ -156,6 +156,7 @@ def test_a_sample_that_determines_a_value_alone_leaves_it_a_useless_interval() -
     values = torch.tensor([3.0, 0.06, 0.064, 0.063, 0.065, 0.06]).unsqueeze(-1)
     fit = bc.fit(bc.Samples(wi, wo, values), "lambert + ward_bounded(isotropic)", fixed={"ward_bounded.a": 0.02})
     assert fit.intervals["ward_bounded.rs"].tolist() == [0.0, 1.0]
+    assert "Few samples decide ward_bounded.rs, so an interval there is as long as the range" in fit.message
     assert fit.to_dict()["standard_errors"]["ward_bounded.rs"] is None
     assert float(fit.intervals["lambert.kd"].diff()) < 0.05
 
