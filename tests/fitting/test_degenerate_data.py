@@ -72,7 +72,9 @@ def test_degenerate_data_end_in_a_sentence(case: str, model: str) -> None:
         assert all(line in fit.report() for line in fit.warnings)
 
 
-@pytest.mark.parametrize("loss", ["log", "cube_root", "relative"])
+@pytest.mark.parametrize(
+    "loss", ["log", *(pytest.param(loss, marks=pytest.mark.full) for loss in ("cube_root", "relative"))]
+)
 @pytest.mark.parametrize("case", CASES)
 def test_so_it_is_under_every_loss(case: str, loss: str) -> None:
     check(bc.fit(CASES[case][0], "lambert + kurt", loss=loss))
@@ -90,7 +92,14 @@ def test_values_whose_squares_leave_the_type_are_refused() -> None:
     assert caught.value.field == "values"
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [
+        "one direction",
+        "all zero",
+        *(pytest.param(c, marks=pytest.mark.full) for c in CASES if c not in ("one direction", "all zero")),
+    ],
+)
 def test_so_it_is_for_robust_forms_and_a_known_sigma(case: str) -> None:
     samples, _ = CASES[case]
     check(bc.fit(samples, "lambert + ward_bounded", robust="cauchy"))
@@ -119,7 +128,7 @@ def test_one_direction_determines_a_sum() -> None:
 
 
 @pytest.mark.parametrize("name", ["chassis", "solar_array"])
-@pytest.mark.parametrize("loss", ["cosine", "log", "relative"])
+@pytest.mark.parametrize("loss", ["cosine", "log"])
 def test_the_dynamic_range_of_satellites(measured: pathlib.Path, name: str, loss: str) -> None:
     """Peaks up to 5e4 over values of 1e-4."""
     rows = np.loadtxt(measured / "satellite" / f"{name}_brdf.csv")

@@ -115,10 +115,10 @@ def test_with_grazing_angles_they_are_determined(name: str) -> None:
 def test_where_they_just_become_determined_the_intervals_hold() -> None:
     """At 46 degrees a few data sets do not tell; of those that do, the intervals hold the truth."""
     model = "lambert + kurt_plausible(isotropic)"
-    fits = [bc.fit(steep_less(f"lambert(kd=0.2) + {FRESNEL['kurt_plausible']}", 46, seed), model) for seed in range(30)]
+    fits = [bc.fit(steep_less(f"lambert(kd=0.2) + {FRESNEL['kurt_plausible']}", 46, seed), model) for seed in range(16)]
     told = [fit.intervals["kurt_plausible.ks"].tolist() for fit in fits if not fit.undetermined]
-    assert 15 <= len(told) < 30
-    assert sum(low <= 0.4 <= high for low, high in told) >= 0.85 * len(told)
+    assert 8 <= len(told) < 16
+    assert sum(low <= 0.4 <= high for low, high in told) >= 0.8 * len(told)
 
 
 def test_channels_are_named_where_others_determine_theirs() -> None:

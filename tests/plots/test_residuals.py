@@ -118,7 +118,7 @@ def test_the_brightest_channel_is_drawn_unless_one_is_named(fit: bc.Fit) -> None
     assert caught.value.field == "channel"
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize("count", [1, 3])
 def test_few_samples_are_drawn_too(tmp_path: pathlib.Path, count: int) -> None:
     fit = bc.fit(scattered(count), "lambert")
     svg = bc.plots.save(bc.plots.residuals(fit), tmp_path / "residuals.svg")
