@@ -4,6 +4,7 @@ Numbers are strict going in: no booleans, no numeric strings, no NaN or Infinity
 degrees and their names end in `_deg`; the BRDF is in 1/sr and never includes the cosine.
 """
 
+import math
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
 
@@ -56,6 +57,15 @@ class ProgressView(View):
     loss: float | None
 
 
+class ProgressEvent(View):
+    """How a job stands, as its events tell it."""
+
+    status: JobStatus
+    progress: ProgressView | None
+    error: str | None
+    attempts: int
+
+
 class JobView(View):
     """What every job shows of itself."""
 
@@ -64,6 +74,7 @@ class JobView(View):
     progress: ProgressView | None
     error: str | None = Field(description="why it failed, in one sentence")
     attempts: int = Field(description="how often it was started")
+    reused: str | None = Field(None, description="the earlier job of the same work, whose result this is")
     created: datetime
     started: datetime | None
     finished: datetime | None
@@ -119,18 +130,29 @@ class InlineSamples(DirectionPairs):
         return self
 
 
-class FitRequest(Body):
-    """What to fit to which data; data is either the id of a dataset or inline samples."""
+class FitOptions(Body):
+    """How to fit, whatever the data and the model are."""
 
-    dataset: str | None = Field(None, description="id that POST /v1/datasets gave")
-    samples: InlineSamples | None = None
-    model: str = Field(min_length=1, max_length=2000, description="for example lambert + ward_bounded")
     loss: str = "cosine"
     optimizer: str = "auto"
     fixed: dict[str, PerChannel] = Field({}, description='held values, such as {"kurt.f0": 0.04}')
     gray: list[str] = Field([], description="keys that keep one value over all channels")
     per_channel: list[str] = Field([], description="keys that get one value a channel")
     seed: int = Field(0, ge=0, lt=2**63)
+    bounds: dict[str, Range] = Field({}, description='[low, high] within a key\'s own box, {"ggx.a": [0.1, 0.3]}')
+    starts: list[dict[str, PerChannel]] = Field([], max_length=64, description="values by key of further starts")
+    robust: str | None = Field(None, description="soft_l1 or cauchy: large residuals count less")
+    robust_scale: float | None = Field(None, description="residual from which they do; the data say, if absent")
+    max_theta_deg: float | None = Field(None, gt=0, le=90, description="steeper samples are left out [degrees]")
+    conserve_energy: bool = Field(False, description="keep every directional albedo at 1 or below")
+
+
+class FitRequest(FitOptions):
+    """What to fit to which data; data is either the id of a dataset or inline samples."""
+
+    dataset: str | None = Field(None, description="id that POST /v1/datasets gave")
+    samples: InlineSamples | None = None
+    model: str = Field(min_length=1, max_length=2000, description="for example lambert + ward_bounded")
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -140,7 +162,23 @@ class FitRequest(Body):
 
     def arguments(self) -> dict[str, Any]:
         """What `brdfcore.fit` and its check are asked, by keyword: everything but the data."""
-        return self.model_dump(exclude={"dataset", "samples"})
+        found = self.model_dump(exclude={"dataset", "samples", "max_theta_deg"})
+        return {**found, "max_theta": None if self.max_theta_deg is None else math.radians(self.max_theta_deg)}
+
+
+class BatchRequest(FitOptions):
+    """One or several models to fit to many datasets, all with the same options."""
+
+    datasets: list[str] = Field(min_length=1, max_length=1000, description="ids that POST /v1/datasets gave")
+    models: list[Annotated[str, Field(min_length=1, max_length=2000)]] = Field(min_length=1, max_length=20)
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Self:
+        for name in ("datasets", "models"):
+            given = getattr(self, name)
+            if len(set(given)) < len(given):
+                raise ValueError(f"Expected {name} to be given once each, got one of them twice. Leave it out.")
+        return self
 
 
 class EvaluationRequest(DirectionPairs):
@@ -267,6 +305,12 @@ class RequestView(View):
     gray: list[str]
     per_channel: list[str]
     seed: int
+    bounds: dict[str, list[float]] = {}
+    starts: list[dict[str, float | list[float]]] = []
+    robust: str | None = None
+    robust_scale: float | None = None
+    max_theta_deg: float | None = None
+    conserve_energy: bool = False
 
 
 class CostView(View):
@@ -277,6 +321,40 @@ class CostView(View):
     iterations: int
     starts: int
     optimizer: str
+
+
+class CertificateView(View):
+    """Whether the fitted material could exist, exactly as `Certificate.to_dict()` gives it; null where infinite."""
+
+    verdict: str = Field(description="the finding in plain sentences")
+    energy_conserving: bool
+    decided: bool = Field(description="whether the claimed error leaves no doubt of that")
+    max_albedo: float | None = Field(description="the largest directional albedo [1]")
+    error: float = Field(description="claimed for it [1]")
+    at_theta_deg: float = Field(description="where it is; 90 is the limit towards grazing")
+    at_phi_deg: float
+    channel: int
+    grazing_limit: float | None
+    grazing_exponent: float = Field(description="e of albedo ~ (cos theta)^-e; 0 where there is a limit")
+    exceeds_deg: tuple[float, float] | None = Field(description="first and last angle with an albedo above 1")
+    largest_before: float | None
+    reciprocal: bool
+    reciprocity_error: float
+    min_value: float = Field(description="the smallest BRDF met [1/sr]")
+    pairs: int
+    tolerance: float
+    evaluations: int
+    seconds: float
+
+
+class ConservationView(View):
+    """What it took to keep every albedo at 1 or below, and what that cost in error."""
+
+    free_objective: float = Field(description="the objective of the free optimum")
+    free_max_albedo: float | None = Field(description="its largest albedo [1]; null where infinite")
+    fixed: list[str] = Field(description="keys fixed where the albedo has a limit towards grazing")
+    directions: int = Field(description="at which albedos are held at 1")
+    seconds: float
 
 
 Interval = tuple[float, float] | None
@@ -315,6 +393,8 @@ class FitOutcome(View):
     gray: list[str]
     per_channel: list[str]
     chi_square: tuple[float, int] | None = Field(description="and its degrees of freedom, where sigma is known")
+    certificate: CertificateView
+    conservation: ConservationView | None = Field(description="where conserve_energy was asked for")
     cost: CostView
     channels: list[str]
     data: dict[str, Any]
@@ -338,6 +418,46 @@ class FitPage(View):
     """Fits, newest first; `next` is the cursor of the page that follows."""
 
     items: list[FitSummary]
+    next: str | None
+
+
+class BatchRow(View):
+    """One fit of a batch, in the order of datasets, then of models."""
+
+    dataset: str
+    model: str
+    fit: str = Field(description="id of the fit")
+    status: JobStatus
+    fit_status: Literal["converged", "undetermined", "stopped_early"] | None
+    errors: dict[str, float | None] | None
+    parameters: dict[str, float | list[float | None] | None] | None
+    undetermined: list[str] | None
+    seconds: float | None
+    error: str | None = Field(description="why it failed, in one sentence")
+
+
+class BatchView(View):
+    """Fits that were submitted together: one progress, one table."""
+
+    id: str
+    created: datetime
+    datasets: int
+    models: list[str]
+    finished: bool = Field(description="whether no fit of it is queued or running")
+    fraction: float = Field(description="of the work that is done")
+    counts: dict[JobStatus, int]
+
+
+class BatchTable(View):
+    """The fits of a batch."""
+
+    rows: list[BatchRow]
+
+
+class BatchPage(View):
+    """Batches, newest first; `next` is the cursor of the page that follows."""
+
+    items: list[BatchView]
     next: str | None
 
 

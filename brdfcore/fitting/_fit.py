@@ -8,6 +8,7 @@ from typing import Any
 
 from ..errors import SamplesError
 from ..formats.samples import Masked, Samples
+from .conservation import conserving
 from .plan import Plan, check
 from .result import Fit
 from .search import search
@@ -39,6 +40,7 @@ def fit(
     robust: str | None = None,
     robust_scale: float | None = None,
     max_theta: float | None = None,
+    conserve_energy: bool = False,
 ) -> Fit:
     """The material of the model's form that fits the samples best under the loss, with what it is worth.
 
@@ -58,6 +60,7 @@ def fit(
     robust       "soft_l1" or "cauchy": the loss's residuals count less the larger they are (robust.py), beyond
     robust_scale in the residual's unit; without it, a multiple of the residuals' spread
     max_theta    [rad] leaves out samples with a direction steeper than this, as the literature on MERL drops 80 degrees
+    conserve_energy  keeps the directional albedo at 1 or below at every angle; `conservation` says what that cost
 
     Raises SamplesError, ModelTextError, ParameterError or UnknownNameError for arguments that cannot be fitted. A fit
     that stops early returns what it has.
@@ -77,11 +80,14 @@ def fit(
         robust=robust,
         robust_scale=robust_scale,
         max_theta=max_theta,
+        conserve_energy=conserve_energy,
     )
     say = Teller(progress)
     found = search(plan, [kept], loss, optimizer, seed, say)
     say("uncertainty", 0.95, float(found.outcome.loss[0]))
     (result,) = fits(found.problem, found.outcome, [kept], [samples], seed, found.cost(1))
+    if conserve_energy:
+        result = conserving(result, found, kept, samples, optimizer, say)
     say("done", 1.0, result.objective)
     return replace(result, cost=replace(result.cost, seconds=time.perf_counter() - begun))
 
@@ -110,7 +116,8 @@ def _not_too_steep(samples: Samples, max_theta: float | None) -> Samples:
         return samples
     if count == len(samples):
         raise SamplesError(
-            f"Expected max_theta to leave at least one sample, got {max_theta:g} radians, which leaves none. Raise it.",
+            f"Expected max_theta to leave at least one sample, got {max_theta:g} radians "
+            f"({math.degrees(max_theta):g} degrees), which leaves none. Raise it.",
             field="max_theta",
         )
     left = samples.subset(keep)

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import SamplesError
 from ..formats.samples import Samples
 from ._fit import Teller, planned
+from .conservation import conserving
 from .result import Fit
 from .search import search
 from .worth import fits
@@ -44,6 +45,12 @@ def fit_batch(several: Iterable[Samples], model: str, **keywords: Any) -> list[F
             ends = search(plan, several_, loss, optimizer, seed, say)
             say("uncertainty", 0.95, float(ends.outcome.loss.min()))
             made = fits(ends.problem, ends.outcome, several_, [every[i] for i in here], seed, ends.cost(len(here)))
+            if plan.conserve_energy:
+                alone = zip(made, several_, here, strict=True)
+                made = [
+                    conserving(one, ends.of_material(row), kept, every[i], optimizer, say)
+                    for row, (one, kept, i) in enumerate(alone)
+                ]
             cost = replace(made[0].cost, seconds=(time.perf_counter() - clock) / len(here))
             found.update({i: replace(one, cost=cost) for i, one in zip(here, made, strict=True)})
             done += len(here)

@@ -32,6 +32,7 @@ class Plan:
     robust: str | None = None
     robust_scale: float | None = None
     max_theta: float | None = None  # [rad]
+    conserve_energy: bool = False
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -207,6 +208,7 @@ def check(
     robust: str | None = None,
     robust_scale: float | None = None,
     max_theta: float | None = None,
+    conserve_energy: bool = False,
 ) -> Plan:
     """The plan of these arguments of `fit` for data of so many channels; raises what `fit` would raise."""
     if not isinstance(model, str):
@@ -223,6 +225,11 @@ def check(
         )
     check_robust(robust, robust_scale)
     check_max_theta(max_theta)
+    if not isinstance(conserve_energy, bool):
+        raise ParameterError(
+            f"Expected conserve_energy to be true or false, got {conserve_energy!r}. Pass one of them.",
+            field="conserve_energy",
+        )
     made = plan(
         channels,
         model,
@@ -233,4 +240,4 @@ def check(
         bounds=bounds,
         starts=starts,
     )
-    return replace(made, robust=robust, robust_scale=robust_scale, max_theta=max_theta)
+    return replace(made, robust=robust, robust_scale=robust_scale, max_theta=max_theta, conserve_energy=conserve_energy)

@@ -8,6 +8,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from ..energy.certificate import Certificate, certify
 from ..formats.samples import Samples
 from ..models.form import Form
 from ..models.material import Material
@@ -28,6 +29,17 @@ class Cost:
     iterations: int
     starts: int
     optimizer: str
+
+
+@dataclass(frozen=True)
+class Conservation:
+    """What it took to keep every albedo at 1 or below, and what that cost in error."""
+
+    free_objective: float  # the loss of the free optimum, as `objective` has that of the result
+    free_max_albedo: float  # its largest albedo [1]; may be infinite
+    fixed: tuple[str, ...]  # keys fixed where the albedo has a limit towards grazing
+    directions: int  # at which albedos are held at 1
+    seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +88,17 @@ class Fit:
     cost: Cost
     channels: tuple[str, ...]
     provenance: dict[str, str | int]
+    conservation: Conservation | None = None  # where `conserve_energy` was asked for
 
     @cached_property
     def material(self) -> Material:
         """The fitted material."""
         return Material(self.form, self.values)
+
+    @cached_property
+    def certificate(self) -> Certificate:
+        """The largest directional albedo and where, its limit towards grazing, reciprocity: made when first read."""
+        return certify(self.material)
 
     @property
     def model(self) -> str:
@@ -126,6 +144,8 @@ class Fit:
             "gray": list(self.gray),
             "per_channel": list(self.per_channel),
             "chi_square": None if self.chi_square is None else list(self.chi_square),
+            "certificate": self.certificate.to_dict(),
+            "conservation": None if self.conservation is None else _conservation(self.conservation),
             "cost": vars(self.cost).copy(),
             "channels": list(self.channels),
             "data": self.samples.report(),
@@ -173,6 +193,7 @@ def _report(result: dict[str, Any], correlated: list[str]) -> str:
     if correlated:
         lines.append("strongly correlated: " + ", ".join(correlated))
     lines += [f"note: {sentence}" for sentence in result["warnings"]]
+    lines.append(result["certificate"]["verdict"])
     lines += result["choices"]
     lines += [f"left out: {m['count']} samples, {m['reason']}" for m in result["data"].get("masked", [])]
     cost, made = result["cost"], result["provenance"]
@@ -188,6 +209,10 @@ def _row(key: str, value: float | None, interval: list[float] | None, without: s
     number = "none" if value is None else f"{value:.6g}"
     span = without if interval is None else f"[{interval[0]:.6g}, {interval[1]:.6g}]"
     return f"{key:<32}{number:>12}  {span:<27}{what}".rstrip()
+
+
+def _conservation(it: Conservation) -> dict[str, Any]:
+    return {**vars(it), "free_max_albedo": _number(it.free_max_albedo), "fixed": list(it.fixed)}
 
 
 def _number(value: float) -> float | None:

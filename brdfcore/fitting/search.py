@@ -48,6 +48,13 @@ class Found:
     iterations: int
     optimizer: str
 
+    def of_material(self, row: int) -> "Found":
+        """Where one of the materials ended, as if it had been searched alone."""
+        whole, which = self.problem, torch.tensor([row])
+        scale = None if whole.robust_scale is None else whole.robust_scale[which]
+        alone = Problem(whole.plan, [], whole.loss_kind, robust_scale=scale, data=whole.data.rows(which))
+        return replace(self, problem=alone, outcome=self.outcome.pick(which))
+
     def cost(self, materials: int) -> Cost:
         """What each of so many materials cost but for the time, which ends later; uncertainty evaluates once more."""
         return Cost(0.0, self.evaluations // materials + 1, self.iterations, self.starts, self.optimizer)

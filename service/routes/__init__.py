@@ -1,5 +1,15 @@
 """The routes, one file a resource."""
 
-from . import albedo, datasets, evaluate, fits, health, models, plots
+from . import albedo, batches, datasets, evaluate, events, fits, health, models, plots
 
-ROUTERS = (datasets.router, fits.router, plots.router, albedo.router, evaluate.router, models.router, health.router)
+ROUTERS = (
+    datasets.router,
+    fits.router,
+    events.router,
+    batches.router,
+    plots.router,
+    albedo.router,
+    evaluate.router,
+    models.router,
+    health.router,
+)

@@ -12,7 +12,10 @@ import pytest
 
 import brdfcore as bc
 from brdfcore.cli import main
+from brdfcore.cli.serve import background
 from brdfcore.demo import DATA, MODEL
+from service.keys import hashes
+from service.settings import Settings
 
 BRDF = pathlib.Path(sys.executable).with_name("brdf")
 
@@ -83,12 +86,34 @@ def test_fit_passes_its_options_on(run: Run, tmp_path: pathlib.Path) -> None:
     assert not isinstance(result["parameters"]["kurt.ks"], list)
     assert len(result["parameters"]["lambert.kd"]) == 3
     assert result["data"]["quantity"] == "reflectance_factor"
+    options = ["--quantity", "brdf", "--bounds", "ward_bounded.a=0.2:0.3", "--robust", "cauchy", "--robust-scale", "2"]
+    options += ["--max-theta-deg", "30", "--conserve-energy"]
+    result = json.loads(run("fit", file, "--model", "lambert + ward_bounded", "--json", *options).stdout)
+    assert 0.2 <= float(bc.Material.from_json(result["material"]).values()["ward_bounded.a"]) <= 0.3
+    assert result["data"]["masked"][-1]["count"] == 1
+    assert result["conservation"] is not None
+
+
+def test_fit_by_a_service_is_the_same(run: Run, tmp_path: pathlib.Path) -> None:
+    key = "a-key-of-some-length"
+    with background(Settings(data=tmp_path / "data", port=0, workers=1, api_keys=hashes(key))) as url:
+        done = run("fit", DATA, "--model", MODEL, "--server", url, "--api-key", key, "--json", "--plot", "far.svg")
+        refused = run("fit", DATA, "--model", MODEL, "--server", url)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["parameters"] == bc.fit(bc.read(DATA), MODEL).to_dict()["parameters"]
+    assert (tmp_path / "far.svg").read_text().lstrip().startswith("<?xml")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("brdf: Expected a known API key.")
+    gone = run("fit", DATA, "--model", MODEL, "--server", "http://127.0.0.1:9")  # a port that nobody listens on
+    assert "Is it running?" in gone.stderr
 
 
 MISTAKES = {
     "no file": (("fit", "absent.csv", "--model", "lambert"), "absent.csv"),
     "unknown model": (("fit", DATA, "--model", "lambrt"), "Did you mean 'lambert'"),
     "fixed without a number": (("fit", DATA, "--model", "lambert", "--fixed", "lambert.kd"), "KEY=NUMBER"),
+    "bounds without numbers": (("fit", DATA, "--model", "lambert", "--bounds", "lambert.kd=1"), "KEY=LOW:HIGH"),
+    "too steep": (("fit", DATA, "--model", "lambert", "--max-theta-deg", "0.1"), "radians (0.1 degrees)"),
     "plot suffix": (("fit", DATA, "--model", "lambert", "--plot", "x.pdf"), ".svg or .png"),
     "residuals suffix": (("fit", DATA, "--model", "lambert", "--residuals", "x.pdf"), ".svg or .png"),
     "plot scale": (("fit", DATA, "--model", "lambert", "--plot", "x.svg", "--scale", "cubic"), "a scale"),

@@ -64,7 +64,7 @@ def test_the_result_is_the_library_s_own(fit: dict[str, Any]) -> None:
     columns = [samples[name] for name in ("theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg", "values")]
     own = json.loads(json.dumps(bc.fit(bc.Samples.from_angles(*columns, unit="degrees"), "lambert").to_dict()))
     for result in (own, fit["result"]):
-        del result["cost"]["seconds"], result["report"]
+        del result["cost"]["seconds"], result["certificate"]["seconds"], result["report"]
     assert fit["result"] == own
     assert math.isclose(fit["result"]["parameters"]["lambert.kd"], KD, rel_tol=0.01)
 
@@ -82,6 +82,12 @@ def test_the_request_is_shown_without_its_samples(fit: dict[str, Any]) -> None:
         "gray": [],
         "per_channel": [],
         "seed": 0,
+        "bounds": {},
+        "starts": [],
+        "robust": None,
+        "robust_scale": None,
+        "max_theta_deg": None,
+        "conserve_energy": False,
     }
 
 
@@ -118,6 +124,60 @@ def test_every_argument_reaches_the_fit(http: TestClient) -> None:
     assert isinstance(result["parameters"]["lambert.kd"], float)
     coloured = http.post("/v1/fits", json=body, headers={"prefer": "wait=20"}).json()
     assert len(coloured["result"]["parameters"]["lambert.kd"]) == 2
+    for name in ("optimizer", "seed", "fixed"):
+        del body[name]
+    narrow = {
+        "bounds": {"ward_bounded.rs": [0.1, 0.2]},
+        "starts": [{"ward_bounded.rs": [0.1, 0.15], "ward_bounded.a": 0.3}],
+        "robust": "soft_l1",
+        "robust_scale": 0.5,
+        "max_theta_deg": 60,
+        "conserve_energy": True,
+    }
+    made = http.post("/v1/fits", json=body | narrow, headers={"prefer": "wait=20"}).json()
+    assert made["request"]["max_theta_deg"] == 60
+    result = made["result"]
+    assert all(0.1 <= value <= 0.2 for value in result["parameters"]["ward_bounded.rs"])
+    assert "steeper than 60 degrees" in result["data"]["masked"][0]["reason"]
+    assert result["conservation"]["directions"] == 0
+    assert result["certificate"]["energy_conserving"]
+
+
+def test_a_lobe_that_exceeds_1_is_kept_from_it_at_a_stated_cost(http: TestClient) -> None:
+    """Values as of a diffuser that reflects 1.2 times what it receives."""
+    samples = measured_diffuser()
+    samples["values"] = [[1.2 / KD * value for value in row] for row in samples["values"]]
+    body = {"samples": samples, "model": "lambert + ward_bounded", "fixed": {"ward_bounded.a": 1.0}}
+    free, kept = (
+        http.post("/v1/fits", json=body | {"conserve_energy": asked}, headers={"prefer": "wait=20"}).json()["result"]
+        for asked in (False, True)
+    )
+    assert free["certificate"]["max_albedo"] > 1.001
+    assert free["conservation"] is None
+    assert kept["certificate"]["max_albedo"] <= 1 + 1e-6
+    assert kept["conservation"]["free_objective"] == pytest.approx(free["objective"], rel=1e-9)
+    assert "Conserving energy made the error" in kept["report"]
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "part"),
+    [
+        ({"bounds": {"lambert.kd": [0.5, 0.1]}}, "bounds", "the lower one first"),
+        ({"bounds": {"lambert.kd": [0.5]}}, "bounds.lambert.kd", "at least 2"),
+        ({"starts": [{"lambert.k": 0.5}]}, "starts", "lambert.kd"),
+        ({"robust": "huber"}, "robust", "soft_l1"),
+        ({"robust_scale": 1.0}, "robust_scale", "come with a robust form"),
+        ({"max_theta_deg": 91}, "max_theta_deg", "90"),
+        ({"conserve_energy": "yes"}, "conserve_energy", "bool"),
+    ],
+)
+def test_what_cannot_narrow_a_fit_is_refused(
+    http: TestClient, request_body: Body, change: Body, field: str, part: str
+) -> None:
+    answer = http.post("/v1/fits", json=request_body | change)
+    assert answer.status_code == 422
+    assert answer.json()["field"] == field
+    assert part in answer.json()["detail"]
 
 
 def test_a_dataset_is_fitted_as_inline_samples_are(http: TestClient, fit: dict[str, Any]) -> None:
@@ -308,17 +368,24 @@ def test_openapi_has_every_route_and_its_errors(http: TestClient) -> None:
     assert {path: sorted(operations) for path, operations in paths.items()} == {
         "/": ["get"],
         "/healthz": ["get"],
+        "/metrics": ["get"],
         "/readyz": ["get"],
         "/v1/albedo": ["get", "post"],
         "/v1/albedo/{table_id}": ["delete", "get"],
         "/v1/albedo/{table_id}/cancel": ["post"],
+        "/v1/albedo/{table_id}/events": ["get"],
         "/v1/albedo/{table_id}/table": ["get"],
+        "/v1/batches": ["get", "post"],
+        "/v1/batches/{batch_id}": ["delete", "get"],
+        "/v1/batches/{batch_id}/cancel": ["post"],
+        "/v1/batches/{batch_id}/table": ["get"],
         "/v1/datasets": ["post"],
         "/v1/datasets/{dataset_id}": ["get"],
         "/v1/evaluate": ["post"],
         "/v1/fits": ["get", "post"],
         "/v1/fits/{fit_id}": ["delete", "get"],
         "/v1/fits/{fit_id}/cancel": ["post"],
+        "/v1/fits/{fit_id}/events": ["get"],
         "/v1/fits/{fit_id}/plots/albedo.png": ["get"],
         "/v1/fits/{fit_id}/plots/albedo.svg": ["get"],
         "/v1/fits/{fit_id}/plots/lobes.png": ["get"],
