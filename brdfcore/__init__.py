@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
     from .energy.tables import AlbedoTable, albedo_table
-    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, fit, fit_batch
+    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Support, fit, fit_batch, held_out, supports
     from .formats import FORMATS, read
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
@@ -46,6 +46,7 @@ __all__ = [
     "Preset",
     "Progress",
     "Samples",
+    "Support",
     "__version__",
     "albedo",
     "albedo_table",
@@ -56,12 +57,14 @@ __all__ = [
     "fit",
     "fit_batch",
     "hard_cases",
+    "held_out",
     "hemispherical_albedo",
     "material",
     "plots",
     "read",
     "sampling",
     "study",
+    "supports",
 ]
 
 _MODULES = {
@@ -69,7 +72,18 @@ _MODULES = {
     ".energy.certificate": ("Certificate", "certify"),
     ".energy.hemispherical": ("hemispherical_albedo",),
     ".energy.tables": ("AlbedoTable", "albedo_table"),
-    ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "fit", "fit_batch"),
+    ".fitting": (
+        "LOSSES",
+        "OPTIMIZERS",
+        "ROBUST",
+        "Fit",
+        "Progress",
+        "Support",
+        "fit",
+        "fit_batch",
+        "held_out",
+        "supports",
+    ),
     ".formats": ("FORMATS", "read"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),

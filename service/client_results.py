@@ -106,12 +106,12 @@ class _Fit(_Job[FitView]):
 
     @property
     def status(self) -> str:
-        """How the fit ended, "converged" or "stopped_early"."""
+        """How the fit ended: "converged", "undetermined" (so, but some values are free) or "stopped_early"."""
         return self.result.status
 
     @property
     def undetermined(self) -> list[str]:
-        """The parameters that the data do not determine."""
+        """What the data do not determine: keys, or "key with key" where only the combination is."""
         return self.result.undetermined
 
     @property

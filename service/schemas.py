@@ -368,14 +368,26 @@ class FitOutcome(View):
     material: dict[str, Any]
     loss: str
     objective: float | None
-    status: Literal["converged", "stopped_early"]
+    status: Literal["converged", "undetermined", "stopped_early"] = Field(
+        description="undetermined: converged, but the data leave some values free"
+    )
     message: str
     parameters: dict[str, float | list[float | None] | None]
     standard_errors: dict[str, float | list[float | None] | None]
     intervals: dict[str, Interval | list[Interval]]
     units: dict[str, str]
     errors: dict[str, float | None]
-    undetermined: list[str]
+    undetermined: list[str] = Field(
+        description='what the data leave free: keys, or "key with key" where only the combination is determined'
+    )
+    combinations: list[dict[str, float]] = Field(
+        description="for each such combination, how its values change together, in their units, of length 1"
+    )
+    singular_values: list[float] = Field(description="of the Jacobian, its columns scaled to length 1, falling")
+    covariance_keys: list[str] = Field(description="the rows and columns of covariance and correlations")
+    covariance: list[list[float]] | None = Field(description="in the parameters' units; null for none or more than 32")
+    correlations: list[list[float]] | None
+    warnings: list[str] = Field(description="what the data cannot show of this model, a sentence each")
     choices: list[str]
     fixed: list[str]
     gray: list[str]
@@ -416,7 +428,7 @@ class BatchRow(View):
     model: str
     fit: str = Field(description="id of the fit")
     status: JobStatus
-    fit_status: Literal["converged", "stopped_early"] | None
+    fit_status: Literal["converged", "undetermined", "stopped_early"] | None
     errors: dict[str, float | None] | None
     parameters: dict[str, float | list[float | None] | None] | None
     undetermined: list[str] | None

@@ -59,7 +59,7 @@ def lobes(
             f"Expected theta_i_deg to be one or more angles in [0, 90), got {incidences}. Name angles of incidence.",
             field="theta_i_deg",
         )
-    index, name = _channel(material, samples, channel)
+    index, name = drawn_channel(material, samples, channel)
     azimuth = _azimuth(samples)
     theta = torch.linspace(-math.pi / 2, math.pi / 2, 1441, dtype=torch.float64)[1:-1]
     curves, points = [], []
@@ -84,7 +84,7 @@ def check_scale(scale: str) -> None:
         raise unknown_name("a scale", scale, SCALES, field="scale")
 
 
-def _channel(material: "Material", samples: "Samples | None", channel: str | int | None) -> tuple[int, str]:
+def drawn_channel(material: "Material", samples: "Samples | None", channel: str | int | None) -> tuple[int, str]:
     """The index and the name of the channel that is drawn."""
     names = samples.channels if samples is not None else tuple(str(i) for i in range(material.channels))
     if channel is None:

@@ -110,7 +110,7 @@ def test_arguments_reach_the_service(client: Client) -> None:
 def test_the_report_and_the_plots_are_for_people(client: Client) -> None:
     fit = client.fit(as_samples(), model="lambert")
     assert fit.report().startswith("lambert\nconverged")
-    assert b"<svg" in fit.plot()
+    assert all(b"<svg" in fit.plot(name) for name in ("lobes", "albedo", "residuals"))
     assert fit.plot("lobes", "png", scale="log", theta_i_deg=[20, 40]).startswith(b"\x89PNG")
     assert repr(fit) == f"FitResult({fit.id}, 'lambert', succeeded)"
 
