@@ -1,0 +1,63 @@
+"""The information criterion by which two materials fitted to the same samples are compared.
+
+    criterion = sum r_i^2 / s^2 + p ln n,    p = sum h_i v_i / s^2,    s^2 = sum v_i / n
+
+r_i are the n residuals of the loss, h_i their leverages, v_i = r_i^2 / (1 - h_i) the variance that each seems to have in
+the richer of the two materials, which serves both. Where the noise is even p is the number of free values, and this is
+Schwarz's criterion (1978) with the noise estimated. Where it is not, as under relative noise, when a few samples near the
+mirror direction carry all of it, p counts what the noise of the samples that decide a value can feign (Takeuchi 1976), as
+if there were more values, or fewer samples.
+"""
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from .problem import Problem
+
+_RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding, as in uncertainty.py
+_LEAST = 1e-3  # of 1 - h: a sample that decides a value alone tells little of its own noise
+_OF_NO_CONSEQUENCE = 1e-12  # of the data's squares: residuals of the sixth digit call for no effect, whatever their shape
+
+
+class Spread(NamedTuple):
+    """The squares of an optimum's residuals and their leverages, each (C N,), and the data's own mean square."""
+
+    squares: Tensor
+    leverage: Tensor
+    unit: float
+
+
+def spread(problem: Problem, x: Tensor) -> Spread:
+    """The residuals at the optimum x (1, D) of the problem's only material; those of weight 0 are left out."""
+    gram = problem.gram(x)
+    free = ~problem.held(x, gram.gradient)[0] & (gram.matrix[0].diagonal() > 0)
+    scale = torch.where(free, gram.matrix[0].diagonal().clamp(min=1e-300).rsqrt(), 0.0)
+    inverse = _inverse(scale.unsqueeze(1) * gram.matrix[0] * scale) * torch.outer(scale, scale)
+    own = torch.stack([inverse[index][:, index] for index in problem.index])  # (C, P, P)
+    squares, leverage = [], []
+    for piece in problem.data.chunks(problem.channels):
+        r, columns, _ = problem.jacobian(x, piece)  # (1, C, N), (1, C, P, N)
+        counted = (piece.root_weight > 0).expand_as(r)
+        squares.append(r[counted].square())
+        leverage.append((columns * (own @ columns)).sum(2)[counted])
+    every = torch.cat(squares)
+    return Spread(every, torch.cat(leverage), float(problem.squares()[0]) / max(1, len(every)))
+
+
+def gain(richer: Spread, leaner: Spread) -> float:
+    """The criterion of the richer material less that of the leaner one [1]; below 0 it asks for the richer."""
+    v = richer.squares / (1 - richer.leverage).clamp(min=_LEAST)
+    v = v.clamp(min=_OF_NO_CONSEQUENCE * richer.unit or 1e-300)
+    fall = richer.squares.sum() - leaner.squares.sum()
+    price = math.log(max(2, len(v))) * ((richer.leverage - leaner.leverage) * v).sum()
+    return float((fall + price) / v.mean())
+
+
+def _inverse(matrix: Tensor) -> Tensor:
+    """The inverse of a positive matrix over the directions that it knows."""
+    values, vectors = torch.linalg.eigh(matrix)
+    known = values > _RANK * values.max().clamp(min=1e-300)
+    return (vectors * torch.where(known, 1 / values.clamp(min=1e-300), 0.0)) @ vectors.T
