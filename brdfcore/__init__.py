@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
     from .energy.tables import AlbedoTable, albedo_table
-    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, fit, fit_batch
+    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Rung, fit, fit_batch
+    from .fitting.held_out import HeldOut, held_out
     from .formats import FORMATS, read
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
@@ -41,10 +42,12 @@ __all__ = [
     "AlbedoTable",
     "Certificate",
     "Fit",
+    "HeldOut",
     "Material",
     "Model",
     "Preset",
     "Progress",
+    "Rung",
     "Samples",
     "__version__",
     "albedo",
@@ -56,6 +59,7 @@ __all__ = [
     "fit",
     "fit_batch",
     "hard_cases",
+    "held_out",
     "hemispherical_albedo",
     "material",
     "plots",
@@ -69,7 +73,8 @@ _MODULES = {
     ".energy.certificate": ("Certificate", "certify"),
     ".energy.hemispherical": ("hemispherical_albedo",),
     ".energy.tables": ("AlbedoTable", "albedo_table"),
-    ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "fit", "fit_batch"),
+    ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "Rung", "fit", "fit_batch"),
+    ".fitting.held_out": ("HeldOut", "held_out"),
     ".formats": ("FORMATS", "read"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),

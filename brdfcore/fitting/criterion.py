@@ -2,11 +2,11 @@
 
     criterion = sum r_i^2 / s^2 + p ln n,    p = sum h_i v_i / s^2,    s^2 = sum v_i / n
 
-r_i are the n residuals of the loss, h_i their leverages, v_i = r_i^2 / (1 - h_i) the variance that each seems to have in
-the richer of the two materials, which serves both. Where the noise is even p is the number of free values, and this is
-Schwarz's criterion (1978) with the noise estimated. Where it is not, as under relative noise, when a few samples near the
-mirror direction carry all of it, p counts what the noise of the samples that decide a value can feign (Takeuchi 1976), as
-if there were more values, or fewer samples.
+r_i are the n residuals of the loss, h_i their leverages, v_i = r_i^2 / (1 - h_i) the variance that each seems to
+have in the richer of the two materials, which serves both. Where the noise is even p is the number of free values, and
+this is Schwarz's criterion (1978) with the noise estimated. Where it is not, as under relative noise, when a few
+samples near the mirror direction carry all of it, p counts what the noise of the samples that decide a value can
+feign (Takeuchi 1976), as if there were more values, or fewer samples.
 """
 
 import math
@@ -19,7 +19,9 @@ from .problem import Problem
 
 _RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding, as in uncertainty.py
 _LEAST = 1e-3  # of 1 - h: a sample that decides a value alone tells little of its own noise
-_OF_NO_CONSEQUENCE = 1e-12  # of the data's squares: residuals of the sixth digit call for no effect, whatever their shape
+_OF_NO_CONSEQUENCE = (
+    1e-12  # of the data's squares: residuals of the sixth digit call for no effect, whatever their shape
+)
 
 
 class Spread(NamedTuple):
@@ -60,4 +62,5 @@ def _inverse(matrix: Tensor) -> Tensor:
     """The inverse of a positive matrix over the directions that it knows."""
     values, vectors = torch.linalg.eigh(matrix)
     known = values > _RANK * values.max().clamp(min=1e-300)
-    return (vectors * torch.where(known, 1 / values.clamp(min=1e-300), 0.0)) @ vectors.T
+    inverse: Tensor = (vectors * torch.where(known, 1 / values.clamp(min=1e-300), 0.0)) @ vectors.T
+    return inverse

@@ -2,14 +2,17 @@
 
     [lambert +] [ggx(isotropic | anisotropic, constant | schlick) [+ the same again]]
 
-Every material with more effects contains those with fewer, at a corner of its box or as two values that are equal: f0 = 1
-is `constant`, ax = ay is `isotropic`, ks = 0 is no lobe. So what an effect adds is that effect and nothing else. That is
-why the lobe is one that has a Fresnel factor to switch on: `ward_bounded` with one would be another model, whose gain could
-be that of another shadowing. `kurt`'s alpha and f0 both act on grazing angles, and take each other's place; `ggx` has
-shadowing of its own without a value to fit, reflects at most what comes in, and its tails need no second lobe to be long.
+Every material with more effects contains those with fewer, at a corner of its box or as two values that are equal:
+f0 = 1 is `constant`, ax = ay is `isotropic`, ks = 0 is no lobe. So what an effect adds is that effect and nothing else.
+That is why the lobe is one that has a Fresnel factor to switch on: beside `ward_bounded` a lobe with one is another
+model, whose gain could be that of another shadowing. `kurt`'s alpha and f0 both act on grazing angles, and take each
+other's place; `ggx` has shadowing without a value to fit, reflects at most what comes in, and has long tails without
+a second lobe.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 AUTO = "auto"
 STEPS = ("lobe", "Fresnel", "anisotropy", "second lobe")  # the order in which they are tried
@@ -30,6 +33,11 @@ class Effects:
         """The material's text, every option named."""
         words = f"{'an' if self.anisotropic else ''}isotropic, {'schlick' if self.fresnel else 'constant'}"
         return " + ".join(["lambert"] * self.diffuse + [f"{_LOBE}({words})"] * self.lobes)
+
+    def near(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Values by key of leaner or richer effects, as a start for these: an isotropic lobe is one of equal widths."""
+        widths = {f"{key}{axis}": a for key, a in values.items() if key.endswith(".a") for axis in "xy"}
+        return {**values, **widths}
 
     def plus(self, effect: str) -> "Effects | None":
         """These and one more; None where it is there, or has no lobe to act on."""
@@ -57,4 +65,4 @@ class Effects:
         return None if leaner == self else leaner
 
 
-RICHEST = Effects(lobes=2, fresnel=True, anisotropic=True)
+RICHEST = tuple(Effects(lobes=2, fresnel=True, anisotropic=turned) for turned in (False, True))

@@ -2,8 +2,8 @@
 
     error = sqrt(sum w r_i^2 / sum w)      r_i, the loss's difference at sample i, of the fit that never saw i's block
 
-Each fold is fitted to the samples of the others, from the optimum of all, all folds as one batch; so it costs a few steps
-beside the fit itself, and finds the optimum next to that of all the data.
+Each fold is fitted to the samples of the others, from the optimum of all, all folds as one batch; so it costs a few
+steps beside the fit itself, and finds the optimum next to that of all the data.
 """
 
 import time
@@ -17,13 +17,13 @@ from ..errors import ParameterError
 from ..formats.samples import Samples, angles
 from ._fit import planned
 from .data import Data
-from .incidences import blocks, dealt
+from .incidences import split
 from .least_squares import least_squares
 from .problem import Problem
 from .search import search
 
 _STEPS = 40  # of a fold; it begins next to its optimum
-_ENOUGH = 1e-6  # of a fold's loss: what another step would gain
+_ENOUGH = 1e-9  # of a fold's loss: what another step would gain
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Incidence:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Errors at samples that were left out, root mean squares in the unit of the loss's residual; one a fold, one a block.
+    """Errors at samples that were left out, root mean squares in the unit of the loss's residual, by fold and by block.
 
     `fitted` is the same error of the fit to all samples, at the samples it was fitted to.
     """
@@ -69,8 +69,7 @@ def held_out(
     check_folds(folds, len(kept))
     found = search(plan, [kept], loss, keywords.get("optimizer", "auto"), seed, lambda stage, fraction, value: None)
     begun = time.perf_counter()
-    block = blocks(kept, folds)
-    fold = dealt(block, kept, folds, seed)
+    block, fold = split(kept, folds, seed)
     squares, weights = left_out(found.problem, found.outcome.x, fold)
     own = _squares(found.problem, found.outcome.x, torch.zeros_like(fold))
     theta = _mean(angles(kept.wi)[0], torch.ones_like(weights), block)

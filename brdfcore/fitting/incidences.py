@@ -2,10 +2,12 @@
 
 Neighbours in a scan share their errors of alignment, and a sample's neighbours give it away: leaving out single samples
 flatters a model. So what is left out is
-    whole incidences                              where there are enough of them, of several samples each
-    bands of theta_i, and of phi_i where the      where nearly every sample has an incidence of its own, as in tables over
-    sample was turned                             the half vector (MERL)
-    runs of neighbours among outgoing directions  where there are too few incidences
+
+    whole incidences                         where there are enough of them, of several samples each
+    bands of theta_i, and of phi_i where     where nearly every sample has an incidence of its own, as in tables over
+    the sample was turned                    the half vector (MERL)
+    runs of neighbouring wo                  where there are too few incidences
+
 dealt to the folds so that each holds small and large angles alike.
 """
 
@@ -14,6 +16,7 @@ import math
 import torch
 from torch import Tensor
 
+from ..errors import SamplesError
 from ..formats.samples import Samples, angles
 
 _SAME = math.radians(0.05)  # incidences nearer than this are one: goniometers and files round their angles
@@ -22,12 +25,24 @@ _BLOCKS = 4  # bands or runs in a fold, where blocks are made
 _TURNS = 4  # bands of phi_i, modulo 180 deg, beside those of theta_i
 
 
+def split(samples: Samples, folds: int, seed: int) -> tuple[Tensor, Tensor]:
+    """The block of each sample and the fold that it is left out in, each (N,); raises SamplesError for one block."""
+    block = blocks(samples, folds)
+    if int(block.max()) == 0:
+        raise SamplesError(
+            "Expected samples to hold several directions, so that some can be left out, got one. Measure more, or name "
+            "one model.",
+            field="samples",
+        )
+    return block, dealt(block, samples, folds, seed)
+
+
 def blocks(samples: Samples, folds: int) -> Tensor:
     """The number of the block that each sample belongs to, (N,), from 0 on; at least `folds` blocks if N allows."""
     theta, phi = angles(samples.wi)
     turned = samples.azimuth_observed
     place = samples.wi if turned else torch.stack([theta.sin(), theta.cos()], -1)  # isotropy: turns are repeats
-    exact = torch.unique((place / _SAME).round(), dim=0, return_inverse=True)[1]
+    exact: Tensor = torch.unique((place / _SAME).round(), dim=0, return_inverse=True)[1]
     count = int(exact.max()) + 1
     if count >= folds and len(samples) >= _SEVERAL * count:
         return exact
@@ -60,4 +75,5 @@ def _bands(x: Tensor, count: int) -> Tensor:
 
 def _dense(labels: Tensor) -> Tensor:
     """The labels, numbered from 0 on without gaps."""
-    return torch.unique(labels, return_inverse=True)[1]
+    found: Tensor = torch.unique(labels, return_inverse=True)[1]
+    return found

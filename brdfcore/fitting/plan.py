@@ -147,6 +147,8 @@ def _start(
 def _held_isotropic(form: Form, parsed: Sequence[ParsedTerm]) -> Iterator[str]:
     """A sentence for each term that another of its words, and nothing else, keeps from being anisotropic."""
     for term, written in zip(form.terms, parsed, strict=True):
+        if "anisotropic" in term.model.options:
+            continue
         for pair in term.model.apart:
             rest = [word for word in written.words if word not in pair]
             others = type(term.model).with_words(rest, tuple(written.arguments))

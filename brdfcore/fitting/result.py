@@ -10,6 +10,7 @@ from torch import Tensor
 from ..formats.samples import Samples
 from ..models.form import Form
 from ..models.material import Material
+from .rung import Rung, table
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,7 @@ class Fit:
     cost: Cost
     channels: tuple[str, ...]
     provenance: dict[str, str | int]
+    ladder: tuple[Rung, ...] = ()  # the materials that were tried, where the fit chose among several
 
     @cached_property
     def material(self) -> Material:
@@ -94,6 +96,7 @@ class Fit:
             "channels": list(self.channels),
             "data": self.samples.report(),
             "provenance": dict(self.provenance),
+            "ladder": [rung.to_dict() for rung in self.ladder],
         }
         return {**result, "report": _report(result)}
 
@@ -120,6 +123,7 @@ def _report(result: dict[str, Any]) -> str:
         lines.append("chi-square {:.6g} for {} degrees of freedom".format(*result["chi_square"]))
     if result["undetermined"]:
         lines.append("not determined by the data: " + ", ".join(result["undetermined"]))
+    lines += table(result["ladder"])
     lines += result["choices"]
     lines += [f"left out: {m['count']} samples, {m['reason']}" for m in result["data"].get("masked", [])]
     cost, made = result["cost"], result["provenance"]

@@ -1,5 +1,7 @@
 """One step of the ladder of materials that a fit climbed."""
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,9 +10,9 @@ from typing import Any
 class Rung:
     """A material that was tried: what it adds or leaves out, how it did, and whether the ladder went on from it.
 
-    error and held_out are root mean squares in the unit of the loss's residual: at the samples fitted to, and at incidences
-    that were left out (held_out.py). `criterion` is that of the richer of the two materials compared less that of the
-    leaner one [1]: below 0 it asks for the richer one (criterion.py); NaN on the first rung.
+    error and held_out are root mean squares in the unit of the loss's residual: at the samples fitted to, and at
+    incidences that were left out (held_out.py). `criterion` is that of the richer of the two materials compared less
+    that of the leaner one [1]: below 0 it asks for the richer one (criterion.py); NaN on the first rung.
     """
 
     effect: str
@@ -25,4 +27,18 @@ class Rung:
 
     def to_dict(self) -> dict[str, Any]:
         """The rung as JSON-able data, null where there is no criterion."""
-        return {**vars(self), "criterion": self.criterion if self.criterion == self.criterion else None}
+        return {**vars(self), "criterion": self.criterion if math.isfinite(self.criterion) else None}
+
+
+def table(rungs: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The rungs, as `to_dict` makes them, as lines of text; none for none."""
+    if not rungs:
+        return []
+    lines = [f"{'tried':<24}{'error':>10}{'held out':>11}{'criterion':>11}{'values':>8}{'seconds':>9}  stays"]
+    for rung in rungs:
+        criterion = "" if rung["criterion"] is None else f"{rung['criterion']:.4g}"
+        lines.append(
+            f"{rung['effect']:<24}{rung['error']:>10.4g}{rung['held_out']:>11.4g}{criterion:>11}"
+            f"{rung['parameters']:>8}{rung['seconds']:>9.2f}  {'yes' if rung['kept'] else 'no'}"
+        )
+    return [*lines, ""]
