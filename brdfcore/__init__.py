@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .energy.tables import AlbedoTable, albedo_table
     from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Rung, fit, fit_batch
     from .fitting.held_out import HeldOut, held_out
+    from .fitting.next_directions import NextDirections, next_directions
     from .formats import FORMATS, read
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
@@ -45,6 +46,7 @@ __all__ = [
     "HeldOut",
     "Material",
     "Model",
+    "NextDirections",
     "Preset",
     "Progress",
     "Rung",
@@ -62,6 +64,7 @@ __all__ = [
     "held_out",
     "hemispherical_albedo",
     "material",
+    "next_directions",
     "plots",
     "read",
     "sampling",
@@ -75,6 +78,7 @@ _MODULES = {
     ".energy.tables": ("AlbedoTable", "albedo_table"),
     ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "Rung", "fit", "fit_batch"),
     ".fitting.held_out": ("HeldOut", "held_out"),
+    ".fitting.next_directions": ("NextDirections", "next_directions"),
     ".formats": ("FORMATS", "read"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),

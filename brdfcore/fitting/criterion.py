@@ -2,8 +2,8 @@
 
     criterion = sum r_i^2 / s^2 + p ln n,    p = sum h_i v_i / s^2,    s^2 = sum v_i / n
 
-r_i are the n residuals of the loss, h_i their leverages, v_i = r_i^2 / (1 - h_i) the variance that each seems to
-have in the richer of the two materials, which serves both. Where the noise is even p is the number of free values, and
+r_i are the n residuals of the loss, h_i their leverages, v_i their variances, which follow from the residuals of the
+richer of the two materials (noise.py) and serve both. Where the noise is even p is the number of free values, and
 this is Schwarz's criterion (1978) with the noise estimated. Where it is not, as under relative noise, when a few
 samples near the mirror direction carry all of it, p counts what the noise of the samples that decide a value can
 feign (Takeuchi 1976), as if there were more values, or fewer samples.
@@ -15,6 +15,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from .noise import noise
 from .problem import Problem
 
 _RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding, as in uncertainty.py
@@ -25,10 +26,11 @@ _OF_NO_CONSEQUENCE = (
 
 
 class Spread(NamedTuple):
-    """The squares of an optimum's residuals and their leverages, each (C N,), and the data's own mean square."""
+    """The squares of residuals, their leverages and signals at an optimum, each (C N,), and the data's mean square."""
 
     squares: Tensor
     leverage: Tensor
+    signal: Tensor
     unit: float
 
 
@@ -39,19 +41,21 @@ def spread(problem: Problem, x: Tensor) -> Spread:
     scale = torch.where(free, gram.matrix[0].diagonal().clamp(min=1e-300).rsqrt(), 0.0)
     inverse = _inverse(scale.unsqueeze(1) * gram.matrix[0] * scale) * torch.outer(scale, scale)
     own = torch.stack([inverse[index][:, index] for index in problem.index])  # (C, P, P)
-    squares, leverage = [], []
+    squares, leverage, signal = [], [], []
     for piece in problem.data.chunks(problem.channels):
-        r, columns, _ = problem.jacobian(x, piece)  # (1, C, N), (1, C, P, N)
+        r, columns, slope = problem.jacobian(x, piece)  # (1, C, N), (1, C, P, N)
         counted = (piece.root_weight > 0).expand_as(r)
         squares.append(r[counted].square())
         leverage.append((columns * (own @ columns)).sum(2)[counted])
-    every = torch.cat(squares)
-    return Spread(every, torch.cat(leverage), float(problem.squares()[0]) / max(1, len(every)))
+        signal.append((slope * problem.f(x, piece))[counted])
+    unit = float(problem.squares()[0]) / max(1, sum(map(len, squares)))
+    return Spread(torch.cat(squares), torch.cat(leverage), torch.cat(signal), unit)
 
 
 def gain(richer: Spread, leaner: Spread) -> float:
     """The criterion of the richer material less that of the leaner one [1]; below 0 it asks for the richer."""
-    v = richer.squares / (1 - richer.leverage).clamp(min=_LEAST)
+    seen = richer.squares / (1 - richer.leverage).clamp(min=_LEAST)
+    v = noise(seen, richer.signal).variance(richer.signal)
     v = v.clamp(min=_OF_NO_CONSEQUENCE * richer.unit or 1e-300)
     fall = richer.squares.sum() - leaner.squares.sum()
     price = math.log(max(2, len(v))) * ((richer.leverage - leaner.leverage) * v).sum()
