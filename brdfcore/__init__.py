@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .energy.hemispherical import hemispherical_albedo
     from .energy.tables import AlbedoTable, albedo_table
     from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Rung, fit, fit_batch
+    from .fitting.comparison import Comparison, compare
     from .fitting.held_out import HeldOut, held_out
     from .fitting.next_directions import NextDirections, next_directions
     from .formats import FORMATS, read
@@ -42,6 +43,7 @@ __all__ = [
     "Albedo",
     "AlbedoTable",
     "Certificate",
+    "Comparison",
     "Fit",
     "HeldOut",
     "Material",
@@ -56,6 +58,7 @@ __all__ = [
     "albedo_table",
     "bounds",
     "certify",
+    "compare",
     "energy",
     "errors",
     "fit",
@@ -77,6 +80,7 @@ _MODULES = {
     ".energy.hemispherical": ("hemispherical_albedo",),
     ".energy.tables": ("AlbedoTable", "albedo_table"),
     ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "Rung", "fit", "fit_batch"),
+    ".fitting.comparison": ("Comparison", "compare"),
     ".fitting.held_out": ("HeldOut", "held_out"),
     ".fitting.next_directions": ("NextDirections", "next_directions"),
     ".formats": ("FORMATS", "read"),

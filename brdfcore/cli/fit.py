@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -11,10 +11,12 @@ if TYPE_CHECKING:
 
     from ..fitting import Fit, Progress
 
+T = TypeVar("T")
+
 
 def command(
     file: Annotated[Path, typer.Argument(help="A measured file of any known format.", show_default=False)],
-    model: Annotated[str, typer.Option(help='A material, as in "lambert + ward_bounded".', show_default=False)],
+    model: Annotated[str, typer.Option(help='A material, as in "lambert + ward_bounded", or auto.', show_default=False)],
     loss: Annotated[str, typer.Option(help="cosine, l2, log, cube_root or relative.")] = "cosine",
     optimizer: Annotated[str, typer.Option(help="auto, least_squares, lbfgs or adam.")] = "auto",
     fixed: Annotated[list[str] | None, typer.Option(help="KEY=VALUE to keep, as kurt.f0=0.04; repeatable.")] = None,
@@ -72,7 +74,7 @@ def _pair(text: str) -> tuple[str, float]:
         ) from error
 
 
-def _with_bar(run: "Callable[[Callable[[Progress], None] | None], Fit]") -> "Fit":
+def _with_bar(run: "Callable[[Callable[[Progress], None] | None], T]") -> "T":
     """The result of `run`, which gets a progress callback; the bar shows on a terminal's error output only."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

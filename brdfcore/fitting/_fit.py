@@ -161,3 +161,7 @@ class Teller:
         self.fraction = max(self.fraction, min(fraction, 1.0))
         if self.progress is not None:
             self.progress(Progress(stage, self.begin + self.share * self.fraction, loss))
+
+    def relay(self, part: Progress) -> None:
+        """Report the progress of a fit that is a part of this."""
+        self(part.stage, part.fraction, part.loss)

@@ -136,8 +136,7 @@ def select(
     chosen, ended = _climbed(ladder) if model == AUTO else _listed(ladder, texts(model))
     final = ladder.own(chosen.model)
     final["starts"] = [*final["starts"], chosen.numbers()]
-    last = Teller(progress, 0.8, 0.2)
-    result = fit(samples, chosen.model, progress=lambda p: last(p.stage, p.fraction, p.loss), **final)
+    result = fit(samples, chosen.model, progress=Teller(progress, 0.8, 0.2).relay, **final)
     return replace(
         result,
         ladder=tuple(ladder.rungs),

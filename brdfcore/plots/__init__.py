@@ -2,6 +2,7 @@
 
 from ._figure import kind_of, save, to_bytes
 from .albedo import albedo
+from .comparison import comparison
 from .lobes import check_scale, lobes
 
-__all__ = ["albedo", "check_scale", "kind_of", "lobes", "save", "to_bytes"]
+__all__ = ["albedo", "check_scale", "comparison", "kind_of", "lobes", "save", "to_bytes"]
