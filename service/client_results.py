@@ -108,7 +108,7 @@ class FitResult(JobResult[FitView]):
     _path, _name, _model, _failed = "/v1/fits", "fit", FitView, FitFailedError
 
     def __repr__(self) -> str:
-        return f"FitResult({self.id}, {self.view.request.model!r}, {self.job_status})"
+        return f"FitResult({self.id}, {self.view.request.models or self.view.request.model!r}, {self.job_status})"
 
     @property
     def result(self) -> FitOutcome:

@@ -80,6 +80,6 @@ def _accepted(service: State, body: bytes) -> Job:
         if dataset is None:
             raise missing(request.dataset or "")
         channels, azimuth_observed = len(dataset.report["channels"]), dataset.report["azimuth_observed"]
-    check(channels, **request.arguments(), azimuth_observed=azimuth_observed)
+    check(channels, request.asked, **request.arguments(), azimuth_observed=azimuth_observed)
     shown = RequestView(**request.model_dump(exclude={"samples"}), samples=summary)
     return service.store.submit(shown.model_dump_json(), body)

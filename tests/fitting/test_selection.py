@@ -127,11 +127,11 @@ def test_the_ladder_is_in_the_result_and_says_why_it_stopped() -> None:
 def test_every_rung_is_no_worse_than_the_one_it_contains() -> None:
     """Each begins where the leaner one ended too."""
     fit = automatic("all, crossed, turned")
-    errors = {rung.effect: rung.error for rung in fit.ladder}
-    for richer in ("lobe", "Fresnel", "anisotropy", "second lobe", "anisotropy + second lobe"):
-        assert errors[richer] < errors["diffuse"]
-    assert errors["anisotropy"] <= errors["Fresnel"] * (1 + 1e-9)
-    assert errors["second lobe"] <= errors["Fresnel"] * (1 + 1e-9)
+    leaner = fit.ladder[0].error
+    for rung in fit.ladder[1:]:
+        if not rung.effect.startswith("without"):
+            assert rung.error <= leaner * (1 + 1e-9), rung.effect
+            leaner = rung.error if rung.kept else leaner
 
 
 def test_a_list_is_chosen_from_by_the_same_rule() -> None:
@@ -157,12 +157,16 @@ def test_keywords_concern_the_materials_that_have_them() -> None:
 
 
 def test_large_data_climb_on_a_part_and_end_on_all() -> None:
-    wi, wo = directions(30_000, 5)
-    samples = noisy("lambert(kd=0.3) + ggx(constant, ks=0.2, a=0.15)", bc.Samples(wi, wo, torch.zeros(30_000)))
-    fit = bc.fit(samples, "auto")
+    wi, wo = directions(25_000, 5)
+    samples = noisy("lambert(kd=0.3) + ggx(constant, ks=0.2, a=0.15)", bc.Samples(wi, wo, torch.zeros(25_000)))
+    text = "lambert + ggx(isotropic, constant)"
+    fit = bc.fit(samples, ["lambert", text])
     assert [term.label for term in fit.form.terms] == ["lambert", "ggx"]
-    assert len(fit.samples) == 30_000
-    assert fit.cost.seconds < 30
+    assert len(fit.samples) == 25_000
+    assert fit.objective == pytest.approx(bc.fit(samples, text).objective, rel=1e-9)
+    per_sample = fit.objective / 25_000
+    assert per_sample != pytest.approx(fit.ladder[-1].error ** 2, rel=1e-6), "the rung saw a part"
+    assert per_sample == pytest.approx(fit.ladder[-1].error ** 2, rel=0.1)
 
 
 @pytest.mark.parametrize("value", [0.0, 1e-30, 1e30, -1.0])
@@ -180,7 +184,7 @@ def test_progress_rises_to_one() -> None:
     fractions = [p.fraction for p in seen]
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1
-    assert {"ladder", "fit", "done"} <= {p.stage for p in seen}
+    assert {"ladder", "scan", "done"} <= {p.stage for p in seen}
 
 
 REFUSED = {
