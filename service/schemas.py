@@ -303,8 +303,8 @@ class RungView(View):
 
     effect: str
     model: str
-    error: float = Field(description="root mean square of the loss's residuals")
-    held_out: float = Field(description="the same at incidences that were left out")
+    error: float | None = Field(description="root mean square of the loss's residuals")
+    held_out: float | None = Field(description="the same at incidences that were left out")
     criterion: float | None = Field(description="below 0 it asks for the richer of the two materials compared [1]")
     parameters: int
     seconds: float

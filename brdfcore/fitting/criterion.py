@@ -20,18 +20,20 @@ from .problem import Problem
 
 _RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding, as in uncertainty.py
 _LEAST = 1e-3  # of 1 - h: a sample that decides a value alone tells little of its own noise
-_OF_NO_CONSEQUENCE = (
-    1e-12  # of the data's squares: residuals of the sixth digit call for no effect, whatever their shape
-)
+_NO_MATTER = 1e-12  # of the data's squares: residuals of the sixth digit call for no effect, whatever their shape
 
 
 class Spread(NamedTuple):
-    """The squares of residuals, their leverages and signals at an optimum, each (C N,), and the data's mean square."""
+    """The squares of residuals, their leverages and signals at an optimum, each (C N,).
+
+    `unit` is the data's mean square, `values` the number of free values.
+    """
 
     squares: Tensor
     leverage: Tensor
     signal: Tensor
     unit: float
+    values: int
 
 
 def spread(problem: Problem, x: Tensor) -> Spread:
@@ -49,14 +51,19 @@ def spread(problem: Problem, x: Tensor) -> Spread:
         leverage.append((columns * (own @ columns)).sum(2)[counted])
         signal.append((slope * problem.f(x, piece))[counted])
     unit = float(problem.squares()[0]) / max(1, sum(map(len, squares)))
-    return Spread(torch.cat(squares), torch.cat(leverage), torch.cat(signal), unit)
+    return Spread(torch.cat(squares), torch.cat(leverage), torch.cat(signal), unit, problem.size)
 
 
 def gain(richer: Spread, leaner: Spread) -> float:
-    """The criterion of the richer material less that of the leaner one [1]; below 0 it asks for the richer."""
+    """The criterion of the richer material less that of the leaner one [1]; below 0 it asks for the richer.
+
+    Infinite where the richer one has fewer than two residuals a value: what it leaves says nothing of the noise.
+    """
+    if len(richer.squares) < 2 * richer.values:
+        return math.inf
     seen = richer.squares / (1 - richer.leverage).clamp(min=_LEAST)
     v = noise(seen, richer.signal).variance(richer.signal)
-    v = v.clamp(min=_OF_NO_CONSEQUENCE * richer.unit or 1e-300)
+    v = v.clamp(min=_NO_MATTER * richer.unit or 1e-300)
     fall = richer.squares.sum() - leaner.squares.sum()
     price = math.log(max(2, len(v))) * ((richer.leverage - leaner.leverage) * v).sum()
     return float((fall + price) / v.mean())

@@ -143,9 +143,15 @@ class _Design:
             self.noise = noise(samples.sigma.T.square().reshape(-1), f.reshape(-1))
             known = samples.sigma.T.square().unsqueeze(0)
         else:
-            counted = (data.root_weight > 0).expand_as(f)
             left = (1 - spread(problem, x).leverage).clamp(min=1e-3)
-            self.noise = noise((f - data.y)[counted].square() / left, f[counted])
+            squares, values, at = [], [], 0
+            for piece in data.chunks(problem.channels):  # as the leverages stand
+                own = f[..., at : at + len(piece.c)]
+                counted = (piece.root_weight > 0).expand_as(own)
+                squares.append((own - piece.y)[counted].square())
+                values.append(own[counted])
+                at += len(piece.c)
+            self.noise = noise(torch.cat(squares) / left, torch.cat(values))
             known = self.noise.variance(f)
         size = problem.size
         a, b = torch.zeros(size, size, dtype=torch.float64), torch.zeros(size, size, dtype=torch.float64)

@@ -11,6 +11,7 @@ from ..errors import ModelTextError, ParameterError, unknown_name
 from ..models.form import Form, build
 from ..models.text import ParsedTerm, Tie, parse
 from ..parameters import Parameter
+from .effects import AUTO
 from .limits import check_max_theta, check_robust, checked_bounds
 from .losses import LOSSES
 
@@ -214,6 +215,11 @@ def check(
     if not isinstance(model, str):
         raise ModelTextError(
             f"Expected model to be a text, got {type(model).__name__}. Write it like 'lambert + ward'.", field="model"
+        )
+    if model == AUTO:
+        raise ModelTextError(
+            f'Expected model to be one text here, got "{AUTO}", which chooses among several. Use bc.fit for that.',
+            field="model",
         )
     if loss not in LOSSES:
         raise unknown_name("a loss", loss, LOSSES, field="loss")

@@ -26,8 +26,9 @@ class Rung:
     reason: str
 
     def to_dict(self) -> dict[str, Any]:
-        """The rung as JSON-able data, null where there is no criterion."""
-        return {**vars(self), "criterion": self.criterion if math.isfinite(self.criterion) else None}
+        """The rung as JSON-able data, null where there is no finite number."""
+        numbers = {name: getattr(self, name) for name in ("error", "held_out", "criterion")}
+        return {**vars(self), **{name: x if math.isfinite(x) else None for name, x in numbers.items()}}
 
 
 def table(rungs: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -36,9 +37,13 @@ def table(rungs: Sequence[Mapping[str, Any]]) -> list[str]:
         return []
     lines = [f"{'tried':<24}{'error':>10}{'held out':>11}{'criterion':>11}{'values':>8}{'seconds':>9}  stays"]
     for rung in rungs:
-        criterion = "" if rung["criterion"] is None else f"{rung['criterion']:.4g}"
+        error, held_out, criterion = (_number(rung[name]) for name in ("error", "held_out", "criterion"))
         lines.append(
-            f"{rung['effect']:<24}{rung['error']:>10.4g}{rung['held_out']:>11.4g}{criterion:>11}"
+            f"{rung['effect']:<24}{error:>10}{held_out:>11}{criterion:>11}"
             f"{rung['parameters']:>8}{rung['seconds']:>9.2f}  {'yes' if rung['kept'] else 'no'}"
         )
     return [*lines, ""]
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"

@@ -3,9 +3,9 @@
 A richer material stays only if incidences that were left out are foretold better (held_out.py) and the information
 criterion falls (criterion.py). "auto" climbs from Lambert's term: each effect that is not there yet is tried in turn,
 again and again until none is called for, at last all that are left at once, for two crossed lobes show only together;
-then each is left out in turn, the diffuse term too (effects.py). A list is
-walked in the order of its numbers of free values. All rungs see the same samples and the same folds, and each starts
-from where the last one that stayed ended, beside its own scan.
+then each is left out in turn, the diffuse term too (effects.py). A list is walked in the order of its numbers of free
+values. All rungs see the same samples and the same folds, and each starts from where the last one that stayed ended,
+beside its own scan.
 """
 
 import math
@@ -115,10 +115,10 @@ class _Ladder:
         """Whether the richer material is called for, the criterion's change, and both in a sentence."""
         criterion = gain(richer.spread, leaner.spread)
         foretells = richer.held_out < leaner.held_out * (1 - _ROUNDING)
-        sentence = (
-            f"the held-out error {_goes(foretells, leaner.held_out, richer.held_out)} and the criterion "
-            f"{'falls' if criterion < 0 else 'rises'} by {abs(criterion):.3g}"
-        )
+        change = f"the criterion {'falls' if criterion < 0 else 'rises'} by {abs(criterion):.3g}"
+        if math.isinf(criterion):
+            change = "there are fewer than two samples a value to judge it by"
+        sentence = f"the held-out error {_goes(foretells, leaner.held_out, richer.held_out)} and {change}"
         return foretells and criterion < -_ROUNDING, criterion, sentence
 
 
@@ -158,7 +158,7 @@ def _climbed(ladder: _Ladder) -> tuple[_Tried, str]:
             break
         been.add(leaner)
         effects = leaner
-    absent = [effect for effect in STEPS if effects.plus(effect) and (observed or effect != "anisotropy")]
+    absent = _absent(effects, observed=observed)
     ended = f"The ladder ends at {current.model}: "
     ended += f"the data call for no {_or(absent)}." if absent else "no effect is left to add."
     if effects.lobes and not observed:
@@ -166,21 +166,26 @@ def _climbed(ladder: _Ladder) -> tuple[_Tried, str]:
     return current, ended
 
 
+def _absent(effects: Effects, *, observed: bool) -> list[str]:
+    """What could be added."""
+    return [effect for effect in STEPS if effects.plus(effect) and (observed or effect != "anisotropy")]
+
+
 def _richer(ladder: _Ladder, effects: Effects, current: _Tried, *, observed: bool) -> tuple[Effects, _Tried]:
     """Effects added until a round of all adds none."""
     grown = True
     while grown:
         grown = False
-        for effect in STEPS:
+        for effect in _absent(effects, observed=observed):
             richer = effects.plus(effect)
-            if richer is None or (effect == "anisotropy" and not observed) or richer.text() in ladder.known:
+            if richer is None or richer.text() in ladder.known:
                 continue
             one = ladder.tried(richer.text(), richer.near(current.numbers()))
             stays, criterion, sentence = ladder.called_for(one, current)
             ladder.note(effect, one, criterion, kept=stays, reason=f"With it {sentence}: {_verdict(stays)}.")
             if stays:
                 effects, current, grown = richer, one, True
-    left = [effect for effect in STEPS if effects.plus(effect) and (observed or effect != "anisotropy")]
+    left = _absent(effects, observed=observed)
     richer = replace(effects, lobes=2, fresnel=True, anisotropic=observed)
     if effects.lobes and len(left) > 1 and richer.text() not in ladder.known:
         one = ladder.tried(richer.text(), richer.near(current.numbers()))

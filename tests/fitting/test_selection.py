@@ -178,6 +178,16 @@ def test_extreme_data_end_with_a_material_and_no_nan(value: float) -> None:
     assert [term.label for term in fit.form.terms] == ["lambert"] or value == 1e30
 
 
+def test_fewer_than_two_samples_a_value_call_for_nothing() -> None:
+    """Five points through which two lobes go exactly."""
+    theta = torch.tensor([5.0, 20.0, 40.0, 55.0, 70.0])
+    values = torch.rand(5, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    fit = bc.fit(bc.Samples.from_angles(theta, 0.0, theta + 3, 180.0, values, unit="degrees"), "auto")
+    assert [term.label for term in fit.form.terms] == ["lambert"]
+    assert "there are fewer than two samples a value to judge it by" in fit.ladder[-1].reason
+    assert json.loads(json.dumps(fit.to_dict(), allow_nan=False))["ladder"][-1]["criterion"] is None
+
+
 def test_progress_rises_to_one() -> None:
     seen: list[bc.Progress] = []
     bc.fit(noisy("lambert(kd=0.4)", geometry(turned=False)), "auto", progress=seen.append)
@@ -210,4 +220,7 @@ def test_refusals_come_before_work(case: str) -> None:
         assert caught.value.field == field
         assert part in str(caught.value)
         assert str(caught.value).startswith("Expected ")
+    for call in (bc.fit_batch, bc.held_out):
+        with pytest.raises(ModelTextError, match=r'^Expected model to be one text here, got "auto"'):
+            call([samples] if call is bc.fit_batch else samples, "auto")
     assert check(3, "auto", fixed={"ggx.a": 0.2, "ggx_2.ax": 0.1}).free
