@@ -42,15 +42,15 @@ def spreads(text: str, model: str, where: bc.Samples, *, sigma: bool, count: int
 
 @pytest.mark.parametrize("sigma", [True, False])
 def test_the_predicted_shrinkage_is_that_of_refits(sigma: bool) -> None:
-    """Over 150 refits to new noise before and after; their ratio has a standard error of 8 %, allowed are three."""
+    """Over 100 refits to new noise before and after; their ratio has a standard error of 10 %, allowed are three."""
     model = "lambert + ward_bounded(isotropic)"
     text = "lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.2)"
     before = within(geometry(turned=False), 60)
     next_ = bc.next_directions(bc.fit(measured(text, before, 0, sigma=sigma), model), 12)
-    old = spreads(text, model, before, sigma=sigma, count=150)
-    new = spreads(text, model, joined(before, next_), sigma=sigma, count=150)
+    old = spreads(text, model, before, sigma=sigma, count=100)
+    new = spreads(text, model, joined(before, next_), sigma=sigma, count=100)
     for key, predicted in next_.shrinkage.items():
-        assert float(new[key] / old[key]) == pytest.approx(float(predicted), rel=0.25), key
+        assert float(new[key] / old[key]) == pytest.approx(float(predicted), rel=0.3), key
     assert min(float(s) for s in next_.shrinkage.values()) < 0.8
 
 
@@ -70,7 +70,7 @@ def test_proposals_beat_random_directions() -> None:
     """The determinant of the information is e^2 times that of the best of 50 random sets, and what is claimed."""
     where = within(geometry(turned=False), 60)
     fit = bc.fit(measured(KURT, where, 0, sigma=True), FIXED)
-    proposed = bc.next_directions(fit, 8)
+    proposed = bc.next_directions(fit, 5)
     before = information(fit, fit.samples.wi, fit.samples.wo, 0.02)
 
     def gained(wi: torch.Tensor, wo: torch.Tensor) -> float:
@@ -79,7 +79,7 @@ def test_proposals_beat_random_directions() -> None:
 
     wi, wo = reachable(fit.samples, math.radians(85))
     generator = torch.Generator().manual_seed(0)
-    draws = [torch.randint(len(wi), (8,), generator=generator) for _ in range(50)]
+    draws = [torch.randint(len(wi), (5,), generator=generator) for _ in range(50)]
     best = gained(proposed.wi, proposed.wo)
     assert best == pytest.approx(proposed.information, rel=0.02)
     assert best > 2 + max(gained(wi[draw], wo[draw]) for draw in draws)
@@ -117,13 +117,13 @@ def test_colours_and_turned_samples() -> None:
     text = "lambert(kd=[0.1, 0.2, 0.3]) + ggx(constant, ks=[0.2, 0.2, 0.3], ax=0.1, ay=0.3)"
     where = within(geometry(turned=True), 50)
     fit = bc.fit(measured(text, where, 0), "lambert + ggx(anisotropic, constant)")
-    found = bc.next_directions(fit, 5)
+    found = bc.next_directions(fit, 3)
     assert found.shrinkage["lambert.kd"].shape == (3,)
-    assert found.wi.shape == (5, 3)
+    assert found.wi.shape == (3, 3)
     assert bool((torch.cat(list(map(torch.atleast_1d, found.shrinkage.values()))) < 1).all())
     result = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert list(result["directions"][0]) == ["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg"]
-    assert len({tuple(row.values()) for row in result["directions"]}) == 5
+    assert len({tuple(row.values()) for row in result["directions"]}) == 3
 
 
 def test_it_stays_in_the_plane_that_was_measured() -> None:
