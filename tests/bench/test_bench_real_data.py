@@ -99,8 +99,8 @@ def test_real_data(source: str, measured: pathlib.Path, tmp_path: pathlib.Path, 
         converged = sum(status == "converged" for *_, status in found)
         show(
             f"{source}, {len(found)} fits of {text}: error over the best of {STARTS} starts at most {ratios.max():.6f} "
-            f"({found[at][0]}), {(ratios > ABOVE).sum()} above {ABOVE}, at least {ratios.min():.6f}; {converged}
-            converged; the starts take " f"{np.median([times for _, _, times, _ in found]):.1f}x as long"
+            f"({found[at][0]}), {(ratios > ABOVE).sum()} above {ABOVE}, at least {ratios.min():.6f}; {converged} "
+            f"converged; the starts take {np.median([times for _, _, times, _ in found]):.1f}x as long"
         )
         assert (ratios > ABOVE).mean() <= MISSED
 
