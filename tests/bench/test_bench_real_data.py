@@ -1,10 +1,10 @@
 """Fits of measured materials beside 16 starts of scipy's trf in the same box; and Kurt's comparison of models.
 
 Every fit must end with a status, without a NaN, and no more than 0.1 % above the lowest error of the 16 starts, a start
-being random values in the ranges of our scan; of one source's materials one in twenty may miss that. Three of CUReT's do
-with two lobes: 11 and 36 by 0.6 %, and 47 by 3.9 %, whose best lobes have slopes of 2.4 and 9.6, outside the scan's range.
-MERL's materials are reconstructions by the networks of Sztrajman et al. 2021 (tests/reconstruction.py), not measurements:
-a random part of their bins, no direction steeper than 80 degrees.
+being random values in the ranges of our scan; of one source's materials one in twenty may miss that. Three of CUReT's
+do with two lobes: 11 and 36 by 0.6 %, and 47 by 3.9 %, whose best lobes have slopes of 2.4 and 9.6, outside the
+scan's range. MERL's materials are reconstructions by the networks of Sztrajman et al. 2021 (tests/reconstruction.py),
+not measurements: a random part of their bins, no direction steeper than 80 degrees.
 """
 
 import math
