@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
     from .energy.tables import AlbedoTable, albedo_table
-    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Support, fit, fit_batch, held_out, supports
+    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Rung, Support, fit, fit_batch, supports
+    from .fitting.comparison import Comparison, compare
+    from .fitting.held_out import HeldOut, held_out
+    from .fitting.next_directions import NextDirections, next_directions
     from .formats import FORMATS, read
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
@@ -40,11 +43,15 @@ __all__ = [
     "Albedo",
     "AlbedoTable",
     "Certificate",
+    "Comparison",
     "Fit",
+    "HeldOut",
     "Material",
     "Model",
+    "NextDirections",
     "Preset",
     "Progress",
+    "Rung",
     "Samples",
     "Support",
     "__version__",
@@ -52,6 +59,7 @@ __all__ = [
     "albedo_table",
     "bounds",
     "certify",
+    "compare",
     "energy",
     "errors",
     "fit",
@@ -60,6 +68,7 @@ __all__ = [
     "held_out",
     "hemispherical_albedo",
     "material",
+    "next_directions",
     "plots",
     "read",
     "sampling",
@@ -78,12 +87,15 @@ _MODULES = {
         "ROBUST",
         "Fit",
         "Progress",
+        "Rung",
         "Support",
         "fit",
         "fit_batch",
-        "held_out",
         "supports",
     ),
+    ".fitting.comparison": ("Comparison", "compare"),
+    ".fitting.held_out": ("HeldOut", "held_out"),
+    ".fitting.next_directions": ("NextDirections", "next_directions"),
     ".formats": ("FORMATS", "read"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),

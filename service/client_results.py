@@ -80,7 +80,8 @@ class _Fit(_Job[FitView]):
     _path, _name, _failed = "/v1/fits", "fit", FitFailedError
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.id}, {self.view.request.model!r}, {self.job_status})"
+        model = self.view.request.models or self.view.request.model
+        return f"{type(self).__name__}({self.id}, {model!r}, {self.job_status})"
 
     @property
     def result(self) -> FitOutcome:

@@ -152,17 +152,32 @@ class FitRequest(FitOptions):
 
     dataset: str | None = Field(None, description="id that POST /v1/datasets gave")
     samples: InlineSamples | None = None
-    model: str = Field(min_length=1, max_length=2000, description="for example lambert + ward_bounded")
+    model: str | None = Field(
+        None,
+        min_length=1,
+        max_length=2000,
+        description='for example lambert + ward_bounded; "auto" chooses the effects that the data call for',
+    )
+    models: list[Annotated[str, Field(min_length=1, max_length=2000)]] | None = Field(
+        None, min_length=1, max_length=32, description="instead of model, several that are compared"
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         if (self.dataset is None) == (self.samples is None):
             raise ValueError("Expected either dataset or samples to be given. Give exactly one of them.")
+        if (self.model is None) == (self.models is None):
+            raise ValueError("Expected either model or models to be given. Give exactly one of them.")
         return self
 
+    @property
+    def asked(self) -> str | list[str]:
+        """The model, or the models that are compared."""
+        return self.models or self.model or ""
+
     def arguments(self) -> dict[str, Any]:
-        """What `brdfcore.fit` and its check are asked, by keyword: everything but the data."""
-        found = self.model_dump(exclude={"dataset", "samples", "max_theta_deg"})
+        """What `brdfcore.fit` or `compare` is asked, by keyword: everything but the data and the models."""
+        found = self.model_dump(exclude={"dataset", "samples", "model", "models", "max_theta_deg"})
         return {**found, "max_theta": None if self.max_theta_deg is None else math.radians(self.max_theta_deg)}
 
 
@@ -298,7 +313,8 @@ class RequestView(View):
 
     dataset: str | None
     samples: SamplesView | None
-    model: str
+    model: str | None
+    models: list[str] | None = None
     loss: str
     optimizer: str
     fixed: dict[str, float | list[float]]
@@ -360,6 +376,20 @@ class ConservationView(View):
 Interval = tuple[float, float] | None
 
 
+class RungView(View):
+    """A material that was tried on the way to the chosen one, and how it did."""
+
+    effect: str
+    model: str
+    error: float | None = Field(description="root mean square of the loss's residuals")
+    held_out: float | None = Field(description="the same at incidences that were left out")
+    criterion: float | None = Field(description="below 0 it asks for the richer of the two materials compared [1]")
+    parameters: int
+    seconds: float
+    kept: bool
+    reason: str
+
+
 class FitOutcome(View):
     """A finished fit, exactly as `Fit.to_dict()` gives it; null where there is no finite number."""
 
@@ -399,7 +429,38 @@ class FitOutcome(View):
     channels: list[str]
     data: dict[str, Any]
     provenance: dict[str, Any]
+    ladder: list[RungView] = Field([], description="the materials that were tried, where the fit chose among several")
     report: str = Field(description="all of this as plain text, for people")
+
+
+class RankedView(View):
+    """One of the models that were compared, with its fit."""
+
+    rank: int
+    model: str
+    errors: dict[str, float | None]
+    objective: float | None
+    status: Literal["converged", "stopped_early"]
+    message: str
+    undetermined: list[str]
+    parameters: int = Field(description="free values, channels counted")
+    seconds: float
+    fit: FitOutcome
+
+
+class ComparisonView(View):
+    """Several models at the same samples, that with the lowest minimised loss first."""
+
+    loss: str
+    ranking: list[RankedView]
+    seconds: float
+    report: str
+
+
+class ComparedOutcome(FitOutcome):
+    """The best of several models' fits, and the comparison of all."""
+
+    comparison: ComparisonView
 
 
 class FitSummary(JobView):
@@ -411,7 +472,7 @@ class FitSummary(JobView):
 class FitView(FitSummary):
     """A fit and, once it has succeeded, its result."""
 
-    result: FitOutcome | None
+    result: ComparedOutcome | FitOutcome | None
 
 
 class FitPage(View):

@@ -19,7 +19,9 @@ _TITLES = {"lobes": "Lobe plot", "residuals": "Residuals"}
 
 def command(
     file: Annotated[Path, typer.Argument(help="A measured file of any known format.", show_default=False)],
-    model: Annotated[str, typer.Option(help='A material, as in "lambert + ward_bounded".', show_default=False)],
+    model: Annotated[
+        str, typer.Option(help='A material, as in "lambert + ward_bounded", or auto.', show_default=False)
+    ],
     loss: Annotated[str, typer.Option(help="cosine, l2, log, cube_root or relative.")] = "cosine",
     optimizer: Annotated[str, typer.Option(help="auto, least_squares, lbfgs or adam.")] = "auto",
     fixed: Annotated[list[str] | None, typer.Option(help="KEY=VALUE to keep, as kurt.f0=0.04; repeatable.")] = None,

@@ -1,12 +1,13 @@
 """Fits of materials to measured samples."""
 
 from ._fit import Progress, fit
-from ._held_out import HeldOut, held_out
+from .asked import check
 from .batch import fit_batch
 from .losses import LOSSES
-from .plan import OPTIMIZERS, check
+from .plan import OPTIMIZERS
 from .result import Cost, Fit
 from .robust import ROBUST
+from .rung import Rung
 from .support import Support, supports
 from .worth import errors
 
@@ -16,13 +17,12 @@ __all__ = [
     "ROBUST",
     "Cost",
     "Fit",
-    "HeldOut",
     "Progress",
+    "Rung",
     "Support",
     "check",
     "errors",
     "fit",
     "fit_batch",
-    "held_out",
     "supports",
 ]

@@ -13,6 +13,7 @@ from ..formats.samples import Samples
 from ..models.form import Form
 from ..models.material import Material
 from .plan import Plan
+from .rung import Rung, table
 
 STATUSES = ("converged", "undetermined", "stopped_early")
 _MOST = 32  # values whose covariances JSON holds; those of more are in `Fit.covariance` alone
@@ -89,6 +90,7 @@ class Fit:
     channels: tuple[str, ...]
     provenance: dict[str, str | int]
     conservation: Conservation | None = None  # where `conserve_energy` was asked for
+    ladder: tuple[Rung, ...] = ()  # the materials that were tried, where the fit chose among several
 
     @cached_property
     def material(self) -> Material:
@@ -150,6 +152,7 @@ class Fit:
             "channels": list(self.channels),
             "data": self.samples.report(),
             "provenance": dict(self.provenance),
+            "ladder": [rung.to_dict() for rung in self.ladder],
         }
         return {**result, "report": _report(result, self._strong())}
 
@@ -194,6 +197,7 @@ def _report(result: dict[str, Any], correlated: list[str]) -> str:
         lines.append("strongly correlated: " + ", ".join(correlated))
     lines += [f"note: {sentence}" for sentence in result["warnings"]]
     lines.append(result["certificate"]["verdict"])
+    lines += table(result["ladder"])
     lines += result["choices"]
     lines += [f"left out: {m['count']} samples, {m['reason']}" for m in result["data"].get("masked", [])]
     cost, made = result["cost"], result["provenance"]

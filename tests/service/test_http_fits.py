@@ -76,6 +76,7 @@ def test_the_request_is_shown_without_its_samples(fit: dict[str, Any]) -> None:
     assert fit["request"] == {
         "dataset": None,
         "model": "lambert",
+        "models": None,
         "loss": "cosine",
         "optimizer": "auto",
         "fixed": {},
@@ -89,6 +90,32 @@ def test_the_request_is_shown_without_its_samples(fit: dict[str, Any]) -> None:
         "max_theta_deg": None,
         "conserve_energy": False,
     }
+
+
+def test_several_models_are_one_job_whose_result_compares_them(http: TestClient, request_body: Body) -> None:
+    del request_body["model"]
+    models = ["lambert + ward(isotropic)", "lambert"]
+    body = request_body | {"models": models, "fixed": {"ward.a": 0.2}, "seed": 3}
+    fit = http.post("/v1/fits", json=body, headers={"prefer": "wait=20"}).json()
+    assert fit["status"] == "succeeded", fit
+    assert fit["request"]["models"] == models
+    assert fit["request"]["model"] is None
+    ranking = fit["result"]["comparison"]["ranking"]
+    assert sorted(row["model"] for row in ranking) == sorted(models)
+    assert [row["rank"] for row in ranking] == [1, 2]
+    assert ranking[0]["objective"] <= ranking[1]["objective"]
+    assert ranking[0]["fit"]["parameters"] == fit["result"]["parameters"]
+    assert http.get(f"/v1/fits/{fit['id']}/plots/lobes.svg").status_code == 200
+    refused = http.post("/v1/fits", json=body | {"models": ["lambert", "lambrt"]}).json()
+    assert "Did you mean 'lambert'" in refused["detail"]
+    for wrong in ({"model": "lambert"}, {"models": None}):
+        assert "either model or models" in http.post("/v1/fits", json=body | wrong).json()["detail"]
+
+
+def test_auto_shows_its_ladder(http: TestClient, request_body: Body) -> None:
+    fit = http.post("/v1/fits", json=request_body | {"model": "auto"}, headers={"prefer": "wait=20"}).json()
+    assert fit["status"] == "succeeded", fit
+    assert [rung["effect"] for rung in fit["result"]["ladder"]][:2] == ["diffuse", "lobe"]
 
 
 def test_vectors_and_angles_are_the_same_samples(http: TestClient, request_body: Body, fit: dict[str, Any]) -> None:
