@@ -1,8 +1,8 @@
 """Where a scanned albedo is largest, and where it exceeds 1.
 
-A scan is cheap and coarse. What may be the largest of its points is looked at again, and around tops that may rise above
-it the albedo is interpolated (patch.py). On the axes x and y, where the sample's symmetry makes the albedo level, the
-azimuth stays as it is.
+A scan is cheap and coarse. What may be the largest of its points is looked at again, and around tops that may rise
+above it the albedo is interpolated (patch.py). On the axes x and y, where the sample's symmetry makes the albedo level,
+the azimuth stays as it is.
 """
 
 import math
@@ -35,8 +35,8 @@ def refined(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tup
     over, doubt, channels = _settled(scan, total, claimed, tolerance)
 
     def point(row: int, column: int) -> Peak:
-        found = (float(table[row, column]) for table in (over, doubt))
-        return Peak(*found, float(scan.u[row]), float(scan.s[column]), int(channels[row, column]))
+        albedo, error, channel = (table[row, column].item() for table in (over, doubt, channels))
+        return Peak(albedo, error, float(scan.u[row]), float(scan.s[column]), int(channel))
 
     _, column = _first(over[-1:], tolerance, scan)
     end = _patch(scan, len(scan.u) - 1, column)
@@ -54,7 +54,7 @@ def refined(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tup
     best = best._replace(error=best.error + max(left, 0.0))
     level = (over >= best.albedo - tolerance / 4) & (doubt < tolerance) & (scan.u < best.u).unsqueeze(-1)
     if bool(level.any()):
-        earlier = point(*largest_index(level.to(torch.int8)))  # type: ignore[arg-type]
+        earlier = point(*largest_index(level.to(torch.int8)))
         best = best._replace(u=earlier.u, s=earlier.s, channel=earlier.channel)
     return best, last
 

@@ -29,6 +29,9 @@ from .lobes import PROFILES, anisotropic, slope_widths
 from .refinement import NODES, Integral, Rows, Sums, take
 from .rules import LADDER, Rule, Tail, gauss
 
+NARROW = 0.05  # a width below which nodes are drawn to a layer at the horizon
+NEGLIGIBLE_LAYER = 10.0  # times the error that may be neglected
+
 
 class _Segments(NamedTuple):
     """Segments of rays on which a lobe is smooth, and which are not empty."""
@@ -60,7 +63,7 @@ class _Nodes(NamedTuple):
 class SlopeDisc(Integral):
     """The integrals over the disc for a lobe with a profile."""
 
-    last = (LADDER.index(2048), LADDER.index(320))
+    last = (LADDER.index(2048), LADDER.index(768))
 
     def __init__(self, model: Model, place: Values, rows: Rows, error: float) -> None:
         super().__init__(model, place, rows, error)
@@ -149,15 +152,16 @@ class SlopeDisc(Integral):
         low, high = edges[..., :-1], edges[..., 1:]
         row, ray, piece = torch.nonzero(high > low, as_tuple=True)
         at = row, ray
-        numbers = (v[:, None] for v in (low[*at, piece], high[*at, piece], end[at], cut[at] & (piece == self.pieces - 1)))
-        return _Segments(
-            row, ray, piece, *numbers, *(v[at][:, None] for v in (s, rays.width, rays.weight))
-        ), cut.all(1)
+        last = piece == self.pieces - 1
+        numbers = (low[*at, piece], high[*at, piece], end[at], cut[at] & last, s[at], rays.width[at], rays.weight[at])
+        return _Segments(row, ray, piece, *(v[:, None] for v in numbers)), cut.all(1)
 
     def _nodes(self, segments: _Segments, rule: Rule) -> _Nodes:
         """The nodes on segments."""
         m, rest, slope = rule.nodes, rule.rest, rule.weights
         power, cut = self.profile.end, segments.cut
+        if self.profile.layer:  # where it is narrow and matters
+            cut = cut & (segments.width < NARROW) & (segments.width**3 > NEGLIGIBLE_LAYER * self.error)
         if power > 1:
             m = torch.where(cut, 1 - rest**power, m)
             slope = torch.where(cut, power * rest ** (power - 1), 1.0) * slope
@@ -183,9 +187,7 @@ def _over_pieces(tail: Tail) -> Tail:
     return tail._replace(early=tail.early.sum(2), late=tail.late.sum(2))
 
 
-def _geometry(
-    model: Model, rows: Rows, rays: Rays, segments: _Segments, nodes: _Nodes
-) -> tuple[Geometry, Tensor]:
+def _geometry(model: Model, rows: Rows, rays: Rays, segments: _Segments, nodes: _Nodes) -> tuple[Geometry, Tensor]:
     """What the model reads at the nodes, and cos theta_i dwi there, each (S, n, 1)."""
     at = segments.row, segments.ray
     x, y, co = (v[:, None, None] for v in (rays.x[at], rays.y[at], rows.co[segments.row]))

@@ -44,10 +44,8 @@ def prepared(text: str) -> tuple[Form, dict[str, torch.Tensor]]:
 
 def _draw(parameter: Parameter, rng: np.random.Generator) -> torch.Tensor:
     low, high = (parameter.low, parameter.high) if rng.random() < 0.5 else parameter.search_range
-    if parameter.scale == "log":
-        value = math.exp(rng.uniform(math.log(low), math.log(high)))
-    else:
-        value = rng.uniform(low, high)
+    log = parameter.scale == "log"
+    value = math.exp(rng.uniform(math.log(low), math.log(high))) if log else rng.uniform(low, high)
     return torch.tensor(min(max(value, parameter.low), parameter.high), dtype=torch.float64)
 
 

@@ -5,7 +5,6 @@ where the true error is at most the claimed one. By Clopper and Pearson's bound 
 than `allowed` of n would refute that at most 0.1 % are.
 """
 
-
 import numpy as np
 import pytest
 import torch
