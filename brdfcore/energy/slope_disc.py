@@ -63,12 +63,12 @@ class _Nodes(NamedTuple):
 class SlopeDisc(Integral):
     """The integrals over the disc for a lobe with a profile."""
 
-    last = (LADDER.index(2048), LADDER.index(768))
-
     def __init__(self, model: Model, place: Values, rows: Rows, error: float) -> None:
         super().__init__(model, place, rows, error)
         self.profile = PROFILES[model.name]
         self.two = anisotropic(model)
+        # Beckmann's masking is smooth, but not analytic, at wi = n: that takes many nodes
+        self.last = LADDER.index(2048), LADDER.index(320 if self.profile.fall == "algebraic" else 768)
         self.pieces = {"none": 1, "equal": 2, "grooves": 3}[self.profile.kink]  # into which kinks part a ray
         with torch.no_grad():
             self.circle = Circle(self.profile, rows, slope_widths(model, self.place), self.two, error)
