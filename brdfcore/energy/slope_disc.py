@@ -80,7 +80,7 @@ class SlopeDisc(Integral):
         if profile.kink == "none":
             rays = (12 if self.two else 4) * share + 22 * share**1.3 * ((steepness - 0.7) / 2.3).clamp(0, 1)
         else:
-            rays = share * (5 + self.circle.fine.squeeze(1) + 8 * ((steepness - 0.3) / 3).clamp(0, 1))
+            rays = share * (5.5 + 1.1 * self.circle.fine.squeeze(1) + 9 * ((steepness - 0.3) / 3).clamp(0, 1))
         inner = 3.0 if profile.fall == "algebraic" else 2.3 if profile.start else 1.8
         return rays, inner * digits
 
