@@ -21,6 +21,7 @@ from ..parameters import Values
 from .rules import gauss
 
 ORDER, HALVINGS = 16, 60  # of the quadrature of a spline's mean: nodes of a cell, and steps that find the cells' ends
+LOST_ERROR = 4e-5  # of a table of lost energy over its whole box [1]: what a compensated lobe may return too much
 MEAN_PRECISE = 1e-14  # of that mean, as a share of it
 
 Exact = Callable[[Model, Values, Tensor], tuple[Tensor, ...]]
