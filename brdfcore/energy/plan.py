@@ -139,7 +139,8 @@ def plan(
         shapes = (value.shape[:-1] for value in values.values() if value.ndim > 1)
         lead = tuple(torch.broadcast_shapes(cos_o.shape, azimuth.shape, *shapes))
         rows = Rows(cos_o.expand(lead).reshape(-1), azimuth.expand(lead).reshape(-1))
-        flat = {key: value.detach() for key, value in flattened(values, lead).items()}
+        # copies: nodes stay where they are when the values are changed in place
+        flat = {key: value.detach().clone() for key, value in flattened(values, lead).items()}
         rule: Drawn | tuple[_Part, ...]
         if method in ("monte_carlo", "sobol"):
             rule, found, error, evaluations = drawn(form, flat, rows, tolerance, method)
