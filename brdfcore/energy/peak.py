@@ -40,7 +40,7 @@ def refined(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tup
 
     _, column = _first(over[-1:], tolerance, scan)
     end = _patch(scan, len(scan.u) - 1, column)
-    low, last = (largest(scan, end._replace(u=u, half_u=0.0), tolerance) for u in scan.u[-2:].tolist())
+    low, last = _ends(scan, end, tolerance)
     last = last._replace(error=last.error + abs(last.albedo - low.albedo))
     best = point(*_first(over, tolerance, scan))
     reach = over + SPARE * _rises(over)
@@ -57,6 +57,20 @@ def refined(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tup
         earlier = point(*largest_index(level.to(torch.int8)))
         best = best._replace(u=earlier.u, s=earlier.s, channel=earlier.channel)
     return best, last
+
+
+def _ends(scan: Scan, end: Patch, tolerance: float) -> tuple[Peak, Peak]:
+    """The largest albedos of the last two rows over a patch of azimuths; where there is but one, in one call."""
+    if end.half_s > 0:
+        low, last = (largest(scan, end._replace(u=u, half_u=0.0), tolerance) for u in scan.u[-2:].tolist())
+        return low, last
+    parts, errors = scan.albedos(scan.u[-2:], torch.full_like(scan.u[-2:], end.s), tolerance / 4)
+    found, error = parts.sum(0), errors.sum(0).amax(1)
+    low, last = (
+        Peak(float(row.max()), float(doubt), float(u), end.s, int(row.argmax()))
+        for row, doubt, u in zip(found, error, scan.u[-2:], strict=True)
+    )
+    return low, last
 
 
 def _settled(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tuple[Tensor, Tensor, Tensor]:
