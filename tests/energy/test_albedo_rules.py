@@ -103,7 +103,7 @@ LOBES = [
     "cook_torrance(constant, ks=1, a=0.5)",
     "ashikhmin_premoze(dielectric, eta=1.5, ks=1, ax=0.2, ay=0.6)",
     "ggx(conductor, eta=0.5, k=2, ks=1, ax=0.3, ay=0.8)",
-    "ggx(constant, separable, compensated, ks=1, a=0.7)",
+    "ggx(constant, separable, ks=1, a=0.7)",
     "beckmann(constant, ks=1, a=1.4)",
 ]
 
