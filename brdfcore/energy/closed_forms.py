@@ -63,7 +63,7 @@ def returned(model: SmithLobe, own: Values, co: Tensor, tolerance: float) -> tup
     that it meets the quotient counts as 1.
     """
     whole = model.returned_albedo(own, co)
-    if tolerance > MEAN_ERROR:
+    if tolerance > 100 * MEAN_ERROR:
         return whole, MEAN_ERROR
     a = own["a"].double().unsqueeze(-1)
     rule = gauss(ORDER).to(co.device)
