@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from format_cases import SMALL_MERL, cornell_bytes, csv_bytes, merl_bytes, npz_bytes
+from format_cases import SMALL_MERL, examples_of
 
 from brdfcore.errors import BrdfError
 from brdfcore.formats import Samples, merl, read
@@ -20,8 +20,8 @@ def small_merl(monkeypatch: pytest.MonkeyPatch) -> tuple[int, int, int]:
 
 @pytest.fixture
 def examples(tmp_path: Path, small_merl: tuple[int, int, int]) -> dict[str, bytes]:
-    """The bytes of a small good file of each format, by the format's name."""
-    return {"csv": csv_bytes(), "cornell": cornell_bytes(), "merl": merl_bytes(), "npz": npz_bytes(tmp_path)}
+    """The bytes of a small good file of each format, by the format's name; what lies beside one is in the folder."""
+    return examples_of(tmp_path)
 
 
 @pytest.fixture
