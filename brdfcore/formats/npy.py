@@ -21,6 +21,7 @@ from ._text import brief
 from .samples import Samples
 
 MAGIC = b"\x93NUMPY"
+_LONGEST_HEADER = 65_535  # bytes, the most of version 1
 _HOW = "Pass it as an argument: the file has no place for it."
 _FIELDS = "Save a one-dimensional array with named fields, named as the columns of a CSV file are, or an npz archive."
 
@@ -59,6 +60,13 @@ def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
 def _load(path: Path) -> "np.ndarray[tuple[int], np.dtype[np.void]]":
     with path.open("rb") as file:
         version = np.lib.format.read_magic(file)
+        length = int.from_bytes(file.read(2 if version == (1, 0) else 4), "little")
+        if length > _LONGEST_HEADER:  # NumPy would make room for it first
+            raise FormatError(
+                f"Expected a header of at most {_LONGEST_HEADER:,} bytes, got {length:,}. "
+                "The file is damaged: save it again with numpy.save."
+            )
+        file.seek(len(MAGIC) + 2)
         header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, _, dtype = header(file)
         if dtype.names is None or len(shape) != 1 or shape[0] == 0:

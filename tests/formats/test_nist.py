@@ -97,7 +97,9 @@ def test_real_ptfe(measured: Path) -> None:
     assert samples.channels == ("351", "532", "633", "1064")
     assert samples.masked == ()
     assert not samples.azimuth_observed
-    steep = samples.wi[:, 2] < 0.3  # theta_i = 75 deg, where even this diffuser has a forward lobe, which peaks towards grazing
+    steep = (
+        samples.wi[:, 2] < 0.3
+    )  # theta_i = 75 deg, where even this diffuser has a forward lobe, which peaks towards grazing
     f, off = samples.values[steep].mean(-1), from_mirror(samples)[steep]
     assert off[f.topk(5).indices].max() < 30  # on the other side it would be above 100
     assert f[off < 15].mean() > 1.5 * f[off > 60].mean()

@@ -64,6 +64,7 @@ def test_declarations_are_arguments(write: Write) -> None:
         (npy_bytes()[:-4], "to hold 108 bytes as its header says (3 rows of 36), got 104"),
         (npy_bytes().replace(b"(3,)", b"(9,)"), "to hold 324 bytes as its header says (9 rows of 36), got 108"),
         (npy_bytes()[:20], "a readable NumPy array, got ValueError"),
+        (b"\x93NUMPY\x02\x00\xff\xff\xff\xff{}", "a header of at most 65,535 bytes, got 4,294,967,295"),
         (b"\x93NUMPY\x09\x00", "a readable NumPy array, got ValueError"),
         (saved(np.array([None, 1])), "a table with named fields, got object"),
     ],
