@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .energy.tables import AlbedoTable, albedo_table
     from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, fit, fit_batch
     from .formats import FORMATS, read
+    from .formats.info import Info, info
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
     from .models.material import Material, material
@@ -41,6 +42,7 @@ __all__ = [
     "AlbedoTable",
     "Certificate",
     "Fit",
+    "Info",
     "Material",
     "Model",
     "Preset",
@@ -57,6 +59,7 @@ __all__ = [
     "fit_batch",
     "hard_cases",
     "hemispherical_albedo",
+    "info",
     "material",
     "plots",
     "read",
@@ -71,6 +74,7 @@ _MODULES = {
     ".energy.tables": ("AlbedoTable", "albedo_table"),
     ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "fit", "fit_batch"),
     ".formats": ("FORMATS", "read"),
+    ".formats.info": ("Info", "info"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),
     ".models.material": ("Material", "material"),

@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from . import albedo, check, demo, fit, models, serve, study
+from . import albedo, check, convert, demo, fit, info, models, serve, study
 
 app = typer.Typer(
     name="brdf",
@@ -14,6 +14,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("fit")(fit.command)
+app.command("info")(info.command)
+app.command("convert")(convert.command)
 app.command("models")(models.command)
 app.command("albedo")(albedo.command)
 app.command("check")(check.command)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ._reading import AngleUnitOption, ColumnsOption, FileArgument, FormatOption, MaterialOption, QuantityOption
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    file: Annotated[Path, typer.Argument(help="A measured file of any known format.", show_default=False)],
+    file: FileArgument,
     model: Annotated[str, typer.Option(help='A material, as in "lambert + ward_bounded".', show_default=False)],
     loss: Annotated[str, typer.Option(help="cosine, l2, log, cube_root or relative.")] = "cosine",
     optimizer: Annotated[str, typer.Option(help="auto, least_squares, lbfgs or adam.")] = "auto",
@@ -27,11 +29,11 @@ def command(
     robust_scale: Annotated[float | None, typer.Option(help="Residual from which they do; else the data say.")] = None,
     max_theta_deg: Annotated[float | None, typer.Option(help="Leave steeper samples out [degrees].")] = None,
     conserve_energy: Annotated[bool, typer.Option("--conserve-energy", help="Keep every albedo at 1 or less.")] = False,
-    format_: Annotated[str | None, typer.Option("--format", help="Insist on a format; else its content tells.")] = None,
-    quantity: Annotated[
-        str | None, typer.Option(help="brdf, brdf_cos or reflectance_factor, where the file does not say.")
-    ] = None,
-    angle_unit: Annotated[str | None, typer.Option(help="degrees or radians, where the file does not say.")] = None,
+    format_: FormatOption = None,
+    quantity: QuantityOption = None,
+    angle_unit: AngleUnitOption = None,
+    columns: ColumnsOption = None,
+    which: MaterialOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Write the lobe plot to this .svg or .png file.")] = None,
     scale: Annotated[str, typer.Option(help="Of the plot's radius: linear, cube_root or log.")] = "linear",
@@ -43,7 +45,7 @@ def command(
     if plot is not None:  # what cannot be drawn is refused before the work, not after it
         bc.plots.kind_of(plot)
         bc.plots.check_scale(scale)
-    samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit)
+    samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit, columns=columns, material=which)
 
     def run(progress: "Callable[[Progress], None] | None") -> "Fit":
         return bc.fit(
