@@ -32,6 +32,8 @@ from .schemas import (
     DatasetView,
     EvaluationView,
     FitView,
+    FormatList,
+    FormatView,
     ModelList,
     ModelView,
     Problem,
@@ -81,6 +83,10 @@ class Client:
         """Every model that a fit's text may name."""
         return ModelList.model_validate_json(self._send("GET", "/v1/models").content).items
 
+    def formats(self) -> list[FormatView]:
+        """Every format of measured files that is read, and whether one file of it can be uploaded."""
+        return FormatList.model_validate_json(self._send("GET", "/v1/formats").content).items
+
     def upload(
         self,
         path: str | os.PathLike[str],
@@ -88,9 +94,10 @@ class Client:
         format: str | None = None,  # noqa: A002 - as in brdfcore.read
         quantity: str | None = None,
         angle_unit: str | None = None,
+        columns: str | None = None,
     ) -> DatasetView:
         """The dataset made of a measured file, which is streamed from the disk."""
-        declared = {"format": format, "quantity": quantity, "angle_unit": angle_unit}
+        declared = {"format": format, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
         with open(path, "rb") as file:
             return self._upload(file, declared)
 
@@ -114,13 +121,15 @@ class Client:
         format: str | None = None,  # noqa: A002 - the name that the library and the service use
         quantity: str | None = None,
         angle_unit: str | None = None,
+        columns: str | None = None,
         wait: bool = True,
         timeout: float | None = None,
     ) -> FitResult:
         """The fit of a model to a measured file, a dataset, arrays by name, or an object like brdfcore.Samples.
 
-        format, quantity and angle_unit declare what data do not say. With wait=True the fit is finished on return;
-        raises FitFailedError, and WaitError after `timeout` s. With wait=False it may still run: see FitResult.wait.
+        format, quantity, angle_unit and columns declare what data do not say. With wait=True the fit is finished on
+        return; raises FitFailedError, and WaitError after `timeout` s. With wait=False it may still run: see
+        FitResult.wait.
         """
         body: dict[str, Any] = {"model": model, "loss": loss, "optimizer": optimizer, "seed": seed}
         body |= {"fixed": _plain(dict(fixed or {})), "gray": list(gray), "per_channel": list(per_channel)}
@@ -130,13 +139,14 @@ class Client:
         if isinstance(data, DatasetView):
             body["dataset"] = data.id
         elif isinstance(data, str | os.PathLike):
-            body["dataset"] = self.upload(data, format=format, quantity=quantity, angle_unit=angle_unit).id
+            declared = {"format": format, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
+            body["dataset"] = self.upload(data, **declared).id
         else:
-            columns = _columns(data, quantity)
-            if len(columns["values"]) > INLINE_ROWS:
-                body["dataset"] = self._upload(_npz(columns), {"angle_unit": "degrees"}).id
+            samples = _columns(data, quantity)
+            if len(samples["values"]) > INLINE_ROWS:
+                body["dataset"] = self._upload(_npz(samples), {"angle_unit": "degrees"}).id
             else:
-                body["samples"] = columns
+                body["samples"] = samples
         return self._submitted("/v1/fits", body, FitResult, FitView, wait, timeout)
 
     def get(self, fit_id: str) -> FitResult:
