@@ -34,12 +34,11 @@ def pyarrow(module: str) -> Any:
         ) from error
 
 
-def check_size(rows: int, columns: int) -> None:
-    """Raise FormatError where a table claims more cells than the limit."""
-    if rows * columns > MAX_NUMBERS:
+def check_numbers(count: int) -> None:
+    """Raise FormatError where a table, or what holds it, is of more numbers than the limit."""
+    if count > MAX_NUMBERS:
         raise FormatError(
-            f"Expected a table of at most {MAX_NUMBERS:,} numbers, got {rows:,} rows of {columns}. "
-            "Split it, or keep fewer samples."
+            f"Expected a table of at most {MAX_NUMBERS:,} numbers, got {count:,}. Split it, or keep fewer samples."
         )
 
 

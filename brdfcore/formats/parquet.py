@@ -11,7 +11,7 @@ types of the columns with it. Needs the extra `arrow`.
 from pathlib import Path
 
 from ..errors import FormatError
-from ._arrow import check_schema, check_size, guarded, pyarrow, samples_from_table, table_of
+from ._arrow import check_numbers, check_schema, guarded, pyarrow, samples_from_table, table_of
 from ._format import Format
 from .samples import Samples
 
@@ -44,10 +44,10 @@ def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
                     f"Expected the row groups to hold {about.num_rows:,} rows as the footer says, got {rows:,}. "
                     "The file is damaged: fetch it again."
                 )
-            check_size(rows, about.num_columns)
+            check_numbers(rows * about.num_columns)
             # the sizes that row groups claim bound what decompression may take
             chunks = [group.column(k) for group in groups for k in range(group.num_columns)]
-            check_size(sum(max(chunk.total_uncompressed_size, 0) for chunk in chunks) // 8, 1)
+            check_numbers(sum(max(chunk.total_uncompressed_size, 0) for chunk in chunks) // 8)
             table = file.read(use_threads=False)
     except Exception as error:
         raise guarded("Parquet", error) from error

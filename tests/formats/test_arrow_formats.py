@@ -111,16 +111,48 @@ def test_large_tables_are_refused_before_they_are_read(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(_arrow, "MAX_NUMBERS", 14)
-    with pytest.raises(FormatError, match=r"a table of at most 14 numbers, got 3 rows of 5"):
+    with pytest.raises(FormatError, match=r"a table of at most 14 numbers, got 1[57]"):
         read(save(arrow_table(), kind, tmp_path / "x"))
+
+
+@pytest.mark.parametrize("compression", ["lz4", "zstd"])
+@pytest.mark.parametrize("kind", ["new_file", "new_stream"])
+def test_compressed_messages_are_read(kind: str, compression: str, tmp_path: Path) -> None:
+    table = pyarrow.concat_tables([arrow_table()] * 400).combine_chunks()
+    options = ipc.IpcWriteOptions(compression=compression)
+    with getattr(ipc, kind)(tmp_path / "x", table.schema, options=options) as writer:
+        writer.write_table(table, max_chunksize=500)
+    assert read(tmp_path / "x").values[:, 0].tolist() == [12.5, 0.25, 0.125] * 400
+
+
+@pytest.mark.parametrize("kind", ["new_file", "new_stream"])
+def test_a_bomb_is_refused_before_it_is_unpacked(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    count = 2_000_000
+    monkeypatch.setattr(_arrow, "MAX_NUMBERS", 1_000_000)
+    table = pyarrow.table({**dict.fromkeys(("wi_x", "wi_y", "wo_x", "wo_y"), np.zeros(count)), "value": np.ones(count)})
+    table = table.append_column("wi_z", [np.ones(count)]).append_column("wo_z", [np.ones(count)])
+    with getattr(ipc, kind)(tmp_path / "x", table.schema, options=ipc.IpcWriteOptions(compression="zstd")) as writer:
+        writer.write_table(table)
+    assert (tmp_path / "x").stat().st_size < 30_000
+    del table
+    before = pyarrow.default_memory_pool().bytes_allocated()
+    monkeypatch.setattr(ipc, "read_record_batch", lambda *_: pytest.fail("it was unpacked"))
+    with pytest.raises(FormatError, match=r"a table of at most 1,000,000 numbers, got 14,000,000\."):
+        read(tmp_path / "x")
+    assert pyarrow.default_memory_pool().bytes_allocated() <= before
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_damaged_files_are_refused(kind: str, tmp_path: Path) -> None:
     path = save(arrow_table(), kind, tmp_path / "x")
     path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(FormatError, match=rf"(?i)a readable {kind} file, got \w+ .*The file is damaged or truncated"):
+    with pytest.raises(FormatError, match=rf"(?i)a readable {kind} file, got .* truncated: fetch it again\."):
         read(path)
+
+
+def test_a_stream_that_breaks_off_is_refused(write: Write) -> None:
+    with pytest.raises(FormatError, match=r"a readable Arrow file, got \w+ .*The file is damaged or truncated"):
+        read(write(arrow_bytes("new_stream")[:-100]))
 
 
 @pytest.mark.parametrize("kind", KINDS)
