@@ -47,9 +47,10 @@ def incidences(samples: Samples) -> tuple[Tensor, Tensor]:
     """
     theta, phi = (torch.round(torch.rad2deg(angle) * _STEP) for angle in angles(samples.wi))
     azimuth = torch.remainder(phi, 360 * _STEP) if samples.azimuth_observed else torch.zeros_like(phi)
-    found = torch.stack([theta, torch.where(theta == 0, torch.zeros_like(theta), azimuth)], -1)
-    distinct, index = found.unique(dim=0, return_inverse=True)
-    return distinct, index
+    turn = 360 * _STEP
+    keys = theta * turn + torch.where(theta == 0, torch.zeros_like(theta), azimuth)  # one number sorts faster than two
+    distinct, index = keys.unique(return_inverse=True)
+    return torch.stack([distinct.div(turn, rounding_mode="floor"), distinct.remainder(turn)], -1), index
 
 
 def reflectances(samples: Samples) -> tuple[Reflectance, ...]:

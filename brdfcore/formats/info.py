@@ -15,6 +15,7 @@ from torch import Tensor
 from ._reflectance import Reflectance, incidences, reflectances
 from .samples import Samples, angles
 
+MOST_FOR_PAIRS = 100_000  # samples of an instrument; a larger table has neighbours at every tenth of a degree
 NEAR_MIRROR = 5.0  # degrees from the mirror direction
 _STEP = 10.0  # directions are the same to a tenth of a degree
 _SHOWN = 12  # incidences and channels that the text lists
@@ -51,7 +52,7 @@ class Info:
     theta_d_deg: tuple[float, float]  # of the directions from the half vector
     near_mirror: int  # samples within NEAR_MIRROR of the mirror direction
     brightest_from_mirror_deg: float
-    reciprocity: Reciprocity | None  # None where there are no such pairs
+    reciprocity: Reciprocity | None  # None where there are no such pairs, or more than MOST_FOR_PAIRS samples
     reflectance: tuple[Reflectance, ...]  # where enough directions were measured around one incidence
 
     def to_dict(self) -> dict[str, Any]:
@@ -102,7 +103,9 @@ class Info:
         masked = [f"{m['count']:,} left out: {m['reason']}" for m in facts["masked"]] or ["nothing was left out"]
         lines += [("masked" if number == 0 else "", line) for number, line in enumerate(masked)]
         if self.reciprocity is None:
-            lines.append(("reciprocity", "no pairs in which light and viewer change places"))
+            few = facts["samples"] <= MOST_FOR_PAIRS
+            none = "no pairs in which light and viewer change places" if few else "not looked for in so many samples"
+            lines.append(("reciprocity", none))
         else:
             found = self.reciprocity
             lines.append(
@@ -160,6 +163,8 @@ def _reciprocity(samples: Samples) -> Reciprocity | None:
 
     Where the sample's azimuth was not observed, only the difference of azimuth counts, and not its sign.
     """
+    if len(samples) > MOST_FOR_PAIRS:
+        return None
     (theta_i, phi_i), (theta_o, phi_o) = angles(samples.wi), angles(samples.wo)
     if samples.azimuth_observed:
         columns = (theta_i, phi_i, theta_o, phi_o), (theta_o, phi_o, theta_i, phi_i)

@@ -38,7 +38,14 @@ def directions(samples: "Samples", *, title: str | None = None) -> "Figure":
     shown: dict[str, Any] = {"s": 9 if len(drawn) < _PICTURE else 4, "rasterized": len(drawn) > _PICTURE}
     _disc(wi, "light, wi")
     distinct = _distinct(drawn.wi)
-    wi.scatter(distinct[:, 0], distinct[:, 1], color=COLOURS[1], clip_on=False, zorder=3, **{**shown, "s": 14})
+    wi.scatter(
+        distinct[:, 0],
+        distinct[:, 1],
+        color=COLOURS[1],
+        clip_on=False,
+        zorder=3,
+        **{**shown, "s": 14 if len(distinct) < 300 else 2},
+    )
     _disc(wo, "viewer, wo")
     colours = {"c": value[order].clamp(min=_floor(value)), "norm": "log", "cmap": "viridis"}
     wo.scatter(drawn.wo[order, 0], drawn.wo[order, 1], clip_on=False, zorder=3, **colours, **shown)

@@ -11,6 +11,7 @@ import torch
 import brdfcore as bc
 from brdfcore.demo import DATA
 from brdfcore.formats import Samples, read
+from brdfcore.formats import info as module
 
 
 def goniometer(incidences: list[float], per_side: int = 19) -> tuple[torch.Tensor, torch.Tensor]:
@@ -87,6 +88,13 @@ def test_reciprocity_counts_pairs_once() -> None:
     found = bc.info(both).reciprocity
     assert found is not None
     assert (found.pairs, found.largest) == (1, 0.0)
+
+
+def test_pairs_are_not_looked_for_among_very_many_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    samples = Samples.from_angles([10, 50], 0, [50, 10], 0, [1, 2], "degrees")
+    assert bc.info(samples).reciprocity is not None
+    monkeypatch.setattr(module, "MOST_FOR_PAIRS", 1)
+    assert "reciprocity           not looked for in so many samples" in bc.info(samples).text()
 
 
 def test_facts_of_the_linoleum() -> None:
