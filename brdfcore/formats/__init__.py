@@ -4,6 +4,7 @@ A format's file holds one `Format`; listing it in FORMATS is all that the reader
 """
 
 import stat
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Final
@@ -32,7 +33,7 @@ def read(
     quantity: str | None = None,
     angle_unit: str | None = None,
     *,
-    columns: str | None = None,
+    columns: str | Sequence[str] | None = None,
     material: int | str | None = None,
 ) -> Samples:
     """The samples of a measured file, values in 1/sr; its format is told by its content, never by its extension.
@@ -40,7 +41,8 @@ def read(
     format      a name from FORMATS insists on that format
     quantity    "brdf", "brdf_cos" or "reflectance_factor", where the file does not say it
     angle_unit  "degrees" or "radians", where the file does not say it
-    columns     the names of a table's columns, as a header row has them, where the file has none or other names
+    columns     the names of a table's columns as a header row has them, a list or separated by commas, where the file
+                has none or other names
     material    which one, where a file holds several
 
     Raises FormatError (unreadable, unknown, damaged, or something is undeclared), SamplesError (a row is no

@@ -13,7 +13,7 @@ does. Other comment lines are ignored.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import torch
@@ -43,7 +43,9 @@ def sniff(head: bytes) -> bool:
     return any(is_direction(name) for name in split_header(found[0])[1])
 
 
-def read(path: Path, quantity: str | None, angle_unit: str | None, columns: str | None = None) -> Samples:
+def read(
+    path: Path, quantity: str | None, angle_unit: str | None, columns: str | Sequence[str] | None = None
+) -> Samples:
     """The samples of a delimited file, values in 1/sr; FormatError or SamplesError names the line at fault."""
     text = text_of(path)
     found = _header_line(text)
@@ -59,7 +61,8 @@ def read(path: Path, quantity: str | None, angle_unit: str | None, columns: str 
             field="columns",
         )
     if columns is not None:
-        given = tuple(name.strip().lower() for name in columns.split(","))
+        listed = columns.split(",") if isinstance(columns, str) else columns
+        given = tuple(str(name).strip().lower() for name in listed)
         if len(given) != len(names):
             raise FormatError(
                 f"Expected columns to name {len(names)} columns as line {first_line - 1} has, got {len(given)}. "

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from format_cases import ALTA
+from mirror_peak import brightest, from_mirror
 
 from brdfcore.errors import FormatError, SamplesError
 from brdfcore.formats import Samples, alta, read
@@ -83,6 +84,17 @@ def test_every_parametrisation_gives_back_both_directions(name: str, write: Writ
         np.testing.assert_allclose(np.stack([wo, wi]), np.stack([v, lit]), rtol=0, atol=1e-12)
     assert samples.azimuth_observed is not isotropic
     assert samples.values[:, 0].tolist() == list(range(1, 41))
+
+
+@pytest.mark.parametrize("name", ["CARTESIAN", "RUSIN_TH_TD_PD", "ISOTROPIC_TV_TL_DPHI"])
+def test_a_real_measurement_written_so_peaks_at_the_mirror_direction(name: str, measured: Path, write: Write) -> None:
+    given = read(measured / "cornell" / "garnet_red.brdf")
+    x = coordinates(name, given.wo.numpy(), given.wi.numpy())
+    values = given.values.mean(-1).tolist()
+    rows = "".join(" ".join(f"{c:.17g}" for c in [*row, f]) + "\n" for row, f in zip(x.tolist(), values, strict=True))
+    samples = read(write(f"#DIM {x.shape[1]} 1\n#PARAM_IN {name}\n#PARAM_OUT INV_STERADIAN\n{rows}"))
+    assert brightest(samples, 1) < 1
+    torch.testing.assert_close(from_mirror(samples), from_mirror(given), rtol=0, atol=1e-5)  # arccos near 1 loses half
 
 
 def test_view_comes_first_and_segments_are_read_past(write: Write) -> None:

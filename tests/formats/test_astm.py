@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import torch
 from format_cases import ASTM
+from mirror_peak import brightest
 
 from brdfcore.errors import FormatError, SamplesError, UnknownNameError
 from brdfcore.formats import Masked, Samples, read
@@ -103,6 +104,17 @@ def test_an_empty_value_is_masked(write: Write) -> None:
     samples = read(write(ASTM.replace("0.25\n", "\n")))
     assert samples.masked == (Masked("a value's cell is empty", 1),)
     assert torch.equal(samples.values, torch.tensor([[12.5], [0.125]], dtype=torch.float64))
+
+
+def test_a_real_measurement_written_so_peaks_at_the_mirror_direction(measured: Path, write: Write) -> None:
+    """Cornell's own rows under ASTM's header, with phi_s left out of it as some instruments do."""
+    lines = (measured / "cornell" / "garnet_red.brdf").read_text().split("\n")
+    rows = [line.split() for line in lines if not line.startswith("#") and len(line.split()) == 35]
+    header = f"NUM_POINTS {len(rows)}\nVARS theta_i,phi_i,theta_s,{','.join(str(w) for w in range(400, 701, 10))}\n"
+    body = "".join(",".join(row) + "\n" for row in rows)
+    samples = read(write(header + body), quantity="brdf", angle_unit="radians")
+    assert samples.hash == read(measured / "cornell" / "garnet_red.brdf").hash
+    assert brightest(samples, 1) < 1
 
 
 def test_vars_may_be_the_first_line(write: Write) -> None:

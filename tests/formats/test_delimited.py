@@ -252,6 +252,7 @@ def test_a_file_without_a_header_row_is_read_with_columns(write: Write) -> None:
     samples = read(write(HEADLESS), quantity="brdf", columns=COLUMNS)
     expected = Samples.from_angles([45, 30], -180, [45, 10], [0, 20], [12.5, 0.25], "degrees")
     assert samples.hash == expected.hash
+    assert read(write(HEADLESS), quantity="brdf", columns=COLUMNS.split(", ")).hash == expected.hash
     with pytest.raises(SamplesError, match=r"at line 3\."):
         read(write(HEADLESS.replace("30 -180", "95 -180")), quantity="brdf", columns=COLUMNS)
 

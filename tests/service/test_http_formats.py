@@ -35,6 +35,10 @@ def test_what_convert_writes_can_be_uploaded(name: str, http: TestClient, tmp_pa
     assert answer.status_code == 201
     report = answer.json()["report"]
     assert (report["format"], report["samples"], report["has_sigma"]) == (name, 222, True)
+    body = {"dataset": answer.json()["id"], "model": "lambert"}
+    fit = http.post("/v1/fits", json=body, headers={"prefer": "wait=30"}).json()
+    assert fit["status"] == "succeeded", fit["error"]
+    assert fit["result"]["data"]["samples"] == 222
 
 
 @pytest.mark.parametrize(
