@@ -1,10 +1,12 @@
 """The routes, one file a resource."""
 
-from . import albedo, datasets, evaluate, fits, formats, health, models, plots
+from . import albedo, batches, datasets, evaluate, events, fits, formats, health, models, plots
 
 ROUTERS = (
     datasets.router,
     fits.router,
+    events.router,
+    batches.router,
     plots.router,
     albedo.router,
     evaluate.router,

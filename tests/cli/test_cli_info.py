@@ -73,6 +73,12 @@ def test_fit_reads_the_same_files(run: Run) -> None:
     assert "lambert.kd" in out
 
 
+def test_a_service_takes_no_file_of_several_materials(run: Run) -> None:
+    code, _, err = run("fit", "x", "--model", "lambert", "--material", "3", "--server", "http://127.0.0.1:1")
+    assert code == 2
+    assert "Expected --material to go without --server, which takes files of one material, got both." in err
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet", ".arrow"])
 def test_convert_keeps_everything(suffix: str, run: Run) -> None:
     if suffix in (".parquet", ".arrow"):
