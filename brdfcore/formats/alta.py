@@ -36,7 +36,7 @@ from ._assemble import from_columns
 from ._declared import declared
 from ._format import Format
 from ._table import line_of, parse_rows
-from ._text import brief, head_text, text_of
+from ._text import brief, text_of
 from .samples import ANGLE_UNITS, QUANTITIES, Samples
 
 Array = npt.NDArray[np.float64]
@@ -44,6 +44,8 @@ Directions = tuple[Array, Array]  # V and L, (N, 3)
 
 _KEY = re.compile(r"^#([A-Za-z_]+)[ \t]*(.*)$", re.MULTILINE)
 _DIM = re.compile(rb"^#DIM[ \t]+\d+[ \t]+\d+[ \t\r]*$", re.MULTILINE)
+_BINARY = re.compile(rb"^#FORMAT[ \t]+binary\b", re.MULTILINE)
+_HEADER = 65_536  # bytes within which the header says so
 _QUANTITY = {"INV_STERADIAN": "brdf"}
 _CHANNELS = {"RGB_COLOR": ("r", "g", "b"), "XYZ_COLOR": ("x", "y", "z")}
 _MOST = 1000  # numbers in a row, beyond which the header is damaged
@@ -120,21 +122,23 @@ _GEOMETRIES: dict[str, tuple[int, bool, Callable[[Array], Directions]]] = {
 
 def sniff(head: bytes) -> bool:
     """Whether a line gives the dimensions as ALTA does."""
-    return head_text(head) is not None and _DIM.search(head) is not None
+    return _DIM.search(head) is not None
 
 
 def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
     """The samples of an ALTA text file, values in 1/sr; FormatError or SamplesError names the line at fault."""
     declared("angle_unit", ANGLE_UNITS, "radians", angle_unit, "")
+    with path.open("rb") as file:
+        binary = _BINARY.search(file.read(_HEADER)) is not None
+    if binary:  # which is no text from here on
+        raise FormatError(
+            "Expected an ALTA file in its text format, got its binary format. Convert it with ALTA's data2data.",
+            field="format",
+        )
     text = text_of(path)
     keys: dict[str, str] = {}
     for key, value in _KEY.findall(text):
         keys.setdefault(key, value.strip())
-    if "FORMAT" in keys and keys["FORMAT"] != "text":
-        raise FormatError(
-            f"Expected an ALTA file in its text format, got {brief(keys['FORMAT'])}. Convert it with ALTA's data2data.",
-            field="format",
-        )
     name, (given, isotropic, directions) = _geometry(keys.get("PARAM_IN", "nothing"))
     dimensions, count = _dimensions(keys.get("DIM", ""))
     if dimensions != given:

@@ -141,7 +141,6 @@ def test_parametrisations_that_leave_a_direction_open_are_refused_by_name(name: 
         (("#VS 2", "#VS 3"), "#VS to be 0, 1 or 2, once or for each of 1 values, got '3'"),
         (("#VS 2", "#VS 0"), "Expected line 7 to have 7 columns as the header has, got 9"),
         (("0.25 0.2", "0.25 x"), "Expected segment 1 at line 8 to be a finite number, got 'x'"),
-        (("#VS 2", "#VS 2\n#FORMAT binary"), "an ALTA file in its text format, got 'binary'. Convert it"),
         (("0 0 1 0 0 1 0.125 0.1 0.2\n", "0.1 0\n"), "Expected line 9 to have 9 columns as the header has, got 2"),
     ],
 )
@@ -149,6 +148,12 @@ def test_damaged_files_are_refused(change: tuple[str, str], words: str, write: W
     with pytest.raises(FormatError) as caught:
         read(write(ALTA.replace(*change, 1)), format="alta")
     assert words in str(caught.value)
+
+
+def test_the_binary_format_is_refused_by_name(write: Write) -> None:
+    head = "#DIM 6 1\n#PARAM_IN  CARTESIAN\n#PARAM_OUT INV_STERADIAN\n#FORMAT binary\n#SAMPLE_COUNT 2\n#BEGIN_STREAM\n"
+    with pytest.raises(FormatError, match=r"in its text format, got its binary format\. Convert it with"):
+        read(write(head.encode() + np.arange(14.0).tobytes() + b"\n#END_STREAM\n"))
 
 
 def test_coordinates_without_meaning_are_refused_by_line(write: Write) -> None:
