@@ -41,16 +41,16 @@ def main(folder: pathlib.Path, fits: int, kills: int) -> None:
             with sqlite3.connect(data / "jobs.sqlite3", timeout=10) as db:
                 db.executescript(COUNTING)
             for seed in range(fits):
-                given = {"model": "lambert + kurt", "optimizer": "adam", "seed": seed}
-                accepted.append(client.fit(measured_diffuser(200), wait=False, **given).id)
+                accepted.append(client.fit(measured_diffuser(2000), model="lambert + kurt", wait=False, seed=seed).id)
             while killed < kills:
-                time.sleep(rng.uniform(0.2, 1.0))
+                time.sleep(rng.uniform(0.0, 0.5))
+                ended = sum(client.get(fit_id).job_status == "succeeded" for fit_id in accepted)
+                if 2 * killed > ended:  # a fit that is killed three times is given up: kill on, but not the same ones
+                    continue
                 for pid in rng.sample(found, 1) if (found := workers()) else ():
                     with contextlib.suppress(ProcessLookupError):
                         os.kill(pid, signal.SIGKILL)
                         killed += 1
-                if not client.recent(status="queued") and not client.recent(status="running"):
-                    break
             process.kill()
             process.wait()
         with server(data, workers=4) as (_, client):
