@@ -47,7 +47,8 @@ def directions(samples: "Samples", *, title: str | None = None) -> "Figure":
         **{**shown, "s": 14 if len(distinct) < 300 else 2},
     )
     _disc(wo, "viewer, wo")
-    colours = {"c": value[order].clamp(min=_floor(value)), "norm": "log", "cmap": "viridis"}
+    floor = _floor(value)
+    colours = {"c": value[order].clamp(min=floor), "norm": "log", "cmap": "viridis"}
     wo.scatter(drawn.wo[order, 0], drawn.wo[order, 1], clip_on=False, zorder=3, **colours, **shown)
     theta_h, theta_d = half_angles_deg(drawn)
     points = plane.scatter(theta_h[order], theta_d[order], clip_on=False, zorder=3, **colours, **shown)
@@ -61,7 +62,7 @@ def directions(samples: "Samples", *, title: str | None = None) -> "Figure":
     plane.set_title("half vector; θ_h = 0 is the mirror direction", fontsize=9)
     plane.set_xlabel("θ_h, half vector from the normal [°]", fontsize=8)
     plane.set_ylabel("θ_d, light from the half vector [°]", fontsize=8)
-    bar = figure.colorbar(points, ax=plane, shrink=0.75)
+    bar = figure.colorbar(points, ax=plane, shrink=0.75, extend="min" if float(value.min()) < floor else "neither")
     bar.set_label("BRDF [1/sr], mean of the channels" if len(samples.channels) > 1 else "BRDF [1/sr]", fontsize=8)
     bar.ax.tick_params(which="both", labelsize=7)
     part = f", of which one in {every} is drawn" if every > 1 else ""
