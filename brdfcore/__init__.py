@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .fitting.held_out import HeldOut, held_out
     from .fitting.next_directions import NextDirections, next_directions
     from .formats import FORMATS, read
+    from .formats.info import Info, info
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
     from .models.material import Material, material
@@ -46,6 +47,7 @@ __all__ = [
     "Comparison",
     "Fit",
     "HeldOut",
+    "Info",
     "Material",
     "Model",
     "NextDirections",
@@ -67,6 +69,7 @@ __all__ = [
     "hard_cases",
     "held_out",
     "hemispherical_albedo",
+    "info",
     "material",
     "next_directions",
     "plots",
@@ -97,6 +100,7 @@ _MODULES = {
     ".fitting.held_out": ("HeldOut", "held_out"),
     ".fitting.next_directions": ("NextDirections", "next_directions"),
     ".formats": ("FORMATS", "read"),
+    ".formats.info": ("Info", "info"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),
     ".models.material": ("Material", "material"),

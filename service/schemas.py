@@ -528,7 +528,9 @@ class DatasetView(View):
     id: str
     bytes: int
     sha256: str
-    declared: dict[str, str | None] = Field(description="format, quantity and angle_unit as the upload declared them")
+    declared: dict[str, str | None] = Field(
+        description="format, quantity, angle_unit and columns as the upload declared them"
+    )
     created: datetime
     report: dict[str, Any] = Field(description="what the samples are, what was masked and why")
 
@@ -557,6 +559,20 @@ class ModelList(View):
 
     items: list[ModelView]
     presets: list[PresetView]
+
+
+class FormatView(View):
+    """A format of measured files; an uploaded file is told by its content to have it."""
+
+    name: str = Field(description="what `format` takes, to insist on it")
+    description: str
+    uploads: bool = Field(description="whether one file holds it all, so that it can be uploaded")
+
+
+class FormatList(View):
+    """Every format of measured files that is read."""
+
+    items: list[FormatView]
 
 
 class HealthView(View):

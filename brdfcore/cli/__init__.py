@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from . import albedo, check, compare, demo, fit, models, serve, study
+from . import albedo, check, compare, convert, demo, fit, info, models, serve, study
 
 app = typer.Typer(
     name="brdf",
@@ -15,6 +15,8 @@ app = typer.Typer(
 )
 app.command("fit")(fit.command)
 app.command("compare")(compare.command)
+app.command("info")(info.command)
+app.command("convert")(convert.command)
 app.command("models")(models.command)
 app.command("albedo")(albedo.command)
 app.command("check")(check.command)

@@ -6,11 +6,12 @@ from typing import Annotated
 
 import typer
 
+from ._reading import AngleUnitOption, ColumnsOption, FileArgument, FormatOption, MaterialOption, QuantityOption
 from .fit import _pair, _with_bar
 
 
 def command(
-    file: Annotated[Path, typer.Argument(help="A measured file of any known format.", show_default=False)],
+    file: FileArgument,
     models: Annotated[
         list[str] | None,
         typer.Option(help='A material, as in "lambert + kurt"; repeatable. By default Lambert with each lobe.'),
@@ -20,11 +21,11 @@ def command(
     fixed: Annotated[list[str] | None, typer.Option(help="KEY=VALUE to keep, as kurt.f0=0.04; repeatable.")] = None,
     gray: Annotated[list[str] | None, typer.Option(help="A key with one value for all channels; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Of the scan for starts.")] = 0,
-    format_: Annotated[str | None, typer.Option("--format", help="Insist on a format; else its content tells.")] = None,
-    quantity: Annotated[
-        str | None, typer.Option(help="brdf, brdf_cos or reflectance_factor, where the file does not say.")
-    ] = None,
-    angle_unit: Annotated[str | None, typer.Option(help="degrees or radians, where the file does not say.")] = None,
+    format_: FormatOption = None,
+    quantity: QuantityOption = None,
+    angle_unit: AngleUnitOption = None,
+    columns: ColumnsOption = None,
+    which: MaterialOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, with each model's fit.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw the errors to this .svg or .png file.")] = None,
 ) -> None:
@@ -36,7 +37,7 @@ def command(
     check_losses(losses or ())
     if plot is not None:  # what cannot be drawn is refused before the work, not after it
         bc.plots.kind_of(plot)
-    samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit)
+    samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit, columns=columns, material=which)
     result = _with_bar(
         lambda progress: bc.compare(
             samples,

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from ._reading import AngleUnitOption, ColumnsOption, FileArgument, FormatOption, MaterialOption, QuantityOption
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -18,7 +20,7 @@ _TITLES = {"lobes": "Lobe plot", "residuals": "Residuals"}
 
 
 def command(
-    file: Annotated[Path, typer.Argument(help="A measured file of any known format.", show_default=False)],
+    file: FileArgument,
     model: Annotated[
         str, typer.Option(help='A material, as in "lambert + ward_bounded", or auto.', show_default=False)
     ],
@@ -33,11 +35,11 @@ def command(
     robust_scale: Annotated[float | None, typer.Option(help="Residual from which they do; else the data say.")] = None,
     max_theta_deg: Annotated[float | None, typer.Option(help="Leave steeper samples out [degrees].")] = None,
     conserve_energy: Annotated[bool, typer.Option("--conserve-energy", help="Keep every albedo at 1 or less.")] = False,
-    format_: Annotated[str | None, typer.Option("--format", help="Insist on a format; else its content tells.")] = None,
-    quantity: Annotated[
-        str | None, typer.Option(help="brdf, brdf_cos or reflectance_factor, where the file does not say.")
-    ] = None,
-    angle_unit: Annotated[str | None, typer.Option(help="degrees or radians, where the file does not say.")] = None,
+    format_: FormatOption = None,
+    quantity: QuantityOption = None,
+    angle_unit: AngleUnitOption = None,
+    columns: ColumnsOption = None,
+    which: MaterialOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Write the lobe plot to this .svg or .png file.")] = None,
     residuals: Annotated[Path | None, typer.Option(help="Write the residuals by angle to this .svg or .png.")] = None,
@@ -60,8 +62,16 @@ def command(
         "robust_scale": robust_scale,
         "conserve_energy": conserve_energy,
     }
-    declared = {"format": format_, "quantity": quantity, "angle_unit": angle_unit}
+    declared = {"format": format_, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
     if server is not None:
+        if which is not None:
+            from ..errors import InvalidValueError
+
+            raise InvalidValueError(
+                "Expected --material to go without --server, which takes files of one material, got both. "
+                "Send what `brdf convert` makes of the file.",
+                field="material",
+            )
         drawn = {"scale": scale, "channel": channel}
         images = {"lobes": (plot, drawn), "residuals": (residuals, {"channel": channel})}
         _remote(server, api_key, file, asked | declared | {"max_theta_deg": max_theta_deg}, as_json, images)
@@ -73,7 +83,7 @@ def command(
             bc.plots.kind_of(path)
             bc.plots.check_scale(scale)
     max_theta = None if max_theta_deg is None else math.radians(max_theta_deg)
-    samples = bc.read(file, **declared)
+    samples = bc.read(file, **declared, material=which)
 
     def run(progress: "Callable[[Progress], None] | None") -> "Fit":
         return bc.fit(samples, **asked, max_theta=max_theta, progress=progress)

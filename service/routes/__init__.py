@@ -1,6 +1,6 @@
 """The routes, one file a resource."""
 
-from . import albedo, batches, datasets, evaluate, events, fits, health, models, plots
+from . import albedo, batches, datasets, evaluate, events, fits, formats, health, models, plots
 
 ROUTERS = (
     datasets.router,
@@ -11,5 +11,6 @@ ROUTERS = (
     albedo.router,
     evaluate.router,
     models.router,
+    formats.router,
     health.router,
 )

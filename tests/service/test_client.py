@@ -1,6 +1,7 @@
 """The client, against the app without sockets, and alone where the service misbehaves."""
 
 import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -144,6 +145,16 @@ def test_a_fit_need_not_be_waited_for(client: Client) -> None:
     fit.delete()
     with pytest.raises(ProblemError, match="Expected the id of a fit"):
         fit.refresh()
+
+
+def test_formats_are_listed_and_a_table_is_named(client: Client, tmp_path: pathlib.Path) -> None:
+    assert [found.name for found in client.formats()] == list(bc.FORMATS)
+    path = tmp_path / "table.txt"
+    path.write_text("10 0 20 180 .2\n20 0 20 180 .2\n")
+    columns = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value"
+    assert client.upload(path, quantity="brdf", columns=columns).report["samples"] == 2
+    fit = client.fit(path, model="lambert", quantity="brdf", columns=columns)
+    assert fit.parameters["lambert.kd"] == pytest.approx(0.2 * math.pi)
 
 
 def test_models_are_listed(client: Client) -> None:

@@ -420,6 +420,7 @@ def test_openapi_has_every_route_and_its_errors(http: TestClient) -> None:
         "/v1/fits/{fit_id}/plots/lobes.svg": ["get"],
         "/v1/fits/{fit_id}/plots/residuals.png": ["get"],
         "/v1/fits/{fit_id}/plots/residuals.svg": ["get"],
+        "/v1/formats": ["get"],
         "/v1/models": ["get"],
     }
     submit = paths["/v1/fits"]["post"]
