@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
     from .energy.tables import AlbedoTable, albedo_table
+    from .exports import EXPORTS, Export, export
     from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, fit, fit_batch
     from .formats import FORMATS, read
     from .formats.samples import QUANTITIES, Samples
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __version__ = version("brdfcore")
 
 __all__ = [
+    "EXPORTS",
     "FORMATS",
     "LOSSES",
     "MODELS",
@@ -40,6 +42,7 @@ __all__ = [
     "Albedo",
     "AlbedoTable",
     "Certificate",
+    "Export",
     "Fit",
     "Material",
     "Model",
@@ -53,6 +56,7 @@ __all__ = [
     "certify",
     "energy",
     "errors",
+    "export",
     "fit",
     "fit_batch",
     "hard_cases",
@@ -69,6 +73,7 @@ _MODULES = {
     ".energy.certificate": ("Certificate", "certify"),
     ".energy.hemispherical": ("hemispherical_albedo",),
     ".energy.tables": ("AlbedoTable", "albedo_table"),
+    ".exports": ("EXPORTS", "Export", "export"),
     ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "fit", "fit_batch"),
     ".formats": ("FORMATS", "read"),
     ".formats.samples": ("QUANTITIES", "Samples"),

@@ -28,6 +28,7 @@ FLOORS = [
     ["energy"],
     ["bounds"],
     ["fitting"],
+    ["exports"],
     ["render"],
     ["plots"],
     ["study"],

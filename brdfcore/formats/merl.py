@@ -112,6 +112,23 @@ def grid() -> tuple[Array, Array, Array]:
     return wi, wo, cell
 
 
+def bins(wi: Array, wo: Array) -> npt.NDArray[np.intp]:
+    """The bin, counted in the file's order, that holds each pair of directions (N, 3), as BRDFRead.cpp looks it up."""
+    half = wi + wo
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    sine = np.hypot(half[:, 0], half[:, 1])
+    theta_h = np.arctan2(sine, half[:, 2])
+    # wi in the frame of the half vector: turned by -phi_h about z, then by -theta_h about y
+    cosine = np.divide(half[:, 0], sine, out=np.ones_like(sine), where=sine > 0)
+    sine_phi = np.divide(half[:, 1], sine, out=np.zeros_like(sine), where=sine > 0)
+    x, y = wi[:, 0] * cosine + wi[:, 1] * sine_phi, wi[:, 1] * cosine - wi[:, 0] * sine_phi
+    x, z = x * half[:, 2] - wi[:, 2] * sine, x * sine + wi[:, 2] * half[:, 2]
+    theta_d, phi_d = np.arctan2(np.hypot(x, y), z), np.arctan2(y, x) % math.pi
+    at = [np.sqrt(theta_h / (math.pi / 2)), theta_d / (math.pi / 2), phi_d / math.pi]
+    i, j, k = (np.clip((a * n).astype(int), 0, n - 1) for a, n in zip(at, SHAPE, strict=True))
+    return (i * SHAPE[1] + j) * SHAPE[2] + k
+
+
 FORMAT = Format(
     name="merl",
     description="MERL .binary: int32 90, 90, 180, then R, G, B planes of float64",
