@@ -26,7 +26,7 @@ from .client_errors import (
     UnreachableError,
     WaitError,
 )
-from .client_results import FitResult, JobResult, Send, TableResult
+from .client_results import ExportedFile, FitResult, JobResult, Send, TableResult
 from .schemas import (
     AlbedoView,
     DatasetView,
@@ -41,6 +41,7 @@ from .schemas import (
 __all__ = [
     "Client",
     "ClientError",
+    "ExportedFile",
     "FitFailedError",
     "FitResult",
     "FitUnfinishedError",

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import ClassVar, Generic, Self, TypeVar
 
 import httpx2
@@ -19,6 +20,16 @@ from .schemas import (
     TableOutcome,
     TableView,
 )
+
+
+@dataclass(frozen=True)
+class ExportedFile:
+    """A fitted material as another program's file, what it holds, and how far from the material that is."""
+
+    content: bytes
+    difference: float  # relative RMS difference of f cos theta_i [1]
+    holds: str
+
 
 Send = Callable[..., httpx2.Response]  # what asks the service: method, path, and what httpx2 takes
 View = TypeVar("View", bound=JobView)
@@ -169,3 +180,8 @@ class FitResult(JobResult[FitView]):
         """The plot of that name, as the bytes of an SVG or PNG file."""
         asked = {"scale": scale, "theta_i_deg": list(theta_i_deg)} | ({"channel": channel} if channel else {})
         return self._send("GET", f"/v1/fits/{self.id}/plots/{name}.{kind}", params=asked).content
+
+    def export(self, format: str) -> ExportedFile:  # noqa: A002 - the name that the library and the service use
+        """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json."""
+        answer = self._send("GET", f"/v1/fits/{self.id}/export/{format}")
+        return ExportedFile(answer.content, float(answer.headers["x-brdf-difference"]), answer.headers["x-brdf-holds"])

@@ -1,6 +1,6 @@
 """Materials as files that other programs read: one file a form, each with its difference from the material stated.
 
-A form's file holds one `Exporter`; listing it in EXPORTS is all that the library, the command line and the service need.
+A form's file holds one `Exporter`; listing it in EXPORTS is all that library, command line and service need.
 """
 
 import re

@@ -1,6 +1,6 @@
 """The member of a two-parameter family of materials that is nearest to a given material.
 
-A family is linear in its two reflectances, each in [0, 1]: f = offset + sum of coefficient * basis, a coefficient a channel.
+A family is linear in its two reflectances, each in [0, 1]: f = offset + sum of coefficient * basis, by channel.
 Its two shape parameters are searched for on a logarithmic grid that closes in on the best point, so that no start can
 lead astray; for each, the reflectances are solved for. What is minimised is the difference of _difference.py.
 """
@@ -17,7 +17,7 @@ from torch import Tensor
 
 from ._difference import Nodes
 
-ROUNDS = 8  # each closes in to the best point's neighbours, by a factor of 3: from a range of 1e4 to 1e-3 of the value
+ROUNDS = 8  # each closes in to the best point's neighbours, by a factor of 3: from 1e4 to 1e-3 of the value
 GRID = 7  # values an axis and round
 POINTS = 2**11  # directions in the search; the difference is then found by more
 
@@ -27,7 +27,7 @@ Bases = Callable[[Nodes, tuple[float, float]], list[Tensor]]
 
 @dataclass(frozen=True)
 class Family:
-    """Bases (N,) of the nodes and the two shape parameters, the offset and two more; and the range of the parameters."""
+    """Bases (N,) of the nodes and two shape parameters, the offset and two more; the range of the parameters."""
 
     bases: Bases
     range: tuple[float, float]
@@ -45,17 +45,16 @@ def nearest(family: Family, at: Nodes, isotropic: bool) -> Nearest:
     """The member of the family with the least difference at the nodes; one shape parameter for both if isotropic."""
     low, high = (math.log(end) for end in family.range)
     centres, half = [0.5 * (low + high)] * (1 if isotropic else 2), 0.5 * (high - low)
-    best: tuple[float, tuple[float, ...], Array] | None = None
+    least, found, best = math.inf, np.zeros(0), tuple(centres)
     steps = [2 * k / (GRID - 1) - 1 for k in range(GRID)]
     for _ in range(ROUNDS):
         axes = [[min(max(centre + half * step, low), high) for step in steps] for centre in centres]
         for point in itertools.product(*axes):
             squares, coefficients = solve(family.bases(at, (math.exp(point[0]), math.exp(point[-1]))), at)
-            if best is None or squares < best[0]:
-                best = squares, point, coefficients
-        assert best is not None
-        centres, half = list(best[1]), half * 2 / (GRID - 1)
-    return Nearest((math.exp(best[1][0]), math.exp(best[1][-1])), torch.from_numpy(best[2]))
+            if squares < least:
+                least, best, found = squares, point, coefficients
+        centres, half = list(best), half * 2 / (GRID - 1)
+    return Nearest((math.exp(best[0]), math.exp(best[-1])), torch.from_numpy(found))
 
 
 def solve(bases: list[Tensor], at: Nodes) -> tuple[float, Array]:

@@ -137,7 +137,7 @@ class Shader:
         return used(frozenset[str]().union(*(r.names for r in routines)), LIBRARY)
 
     def python(self) -> str:
-        """Python code over the language's primitives: routines `brdf`, `density` and `draw` of directions and values."""
+        """Python code over the language's primitives: `brdf`, `density` and `draw` of directions and values."""
         routines = [_GEOMETRY, _MIRROR, *self.lobes, *self.densities, *self.samplers]
 
         def value(name: str) -> str:
@@ -232,6 +232,12 @@ def _like(function: Callable[[Tensor, Tensor], Tensor]) -> Callable[[Any, Any], 
     return of_either
 
 
+def _vec3(*parts: Tensor | float) -> Tensor:
+    """Three columns (N, 1) side by side, or three numbers as one colour (3,)."""
+    tensors = [part for part in parts if isinstance(part, Tensor)]
+    return torch.cat(tensors, -1) if tensors else torch.tensor(parts, dtype=torch.float64)
+
+
 _TORCH: Mapping[str, Any] = {
     "PI": math.pi,
     **{name: getattr(torch, name) for name in ("exp", "log", "sqrt", "sin", "cos", "erf")},
@@ -240,5 +246,5 @@ _TORCH: Mapping[str, Any] = {
     "max": _like(torch.maximum),
     "min": _like(torch.minimum),
     "choose": lambda condition, then, other: torch.where(condition, then, other),
-    "vec3": lambda r, g, b: torch.cat([x if isinstance(x, Tensor) else torch.tensor([x]) for x in (r, g, b)], -1),
+    "vec3": _vec3,
 }

@@ -193,21 +193,20 @@ def _smith(distribution: str, seen: str) -> Callable[[Model, frozenset[str]], Te
 def _oren_nayar(model: Model, coloured: frozenset[str]) -> TermSource:
     dot = "s = xi * xo + yi * yo\n"
     if "qualitative" in model.options:
-        lines = (
-            dot + "a = 1.0 - 0.5 * sq(sigma) / (sq(sigma) + 0.33)\nb = 0.45 * sq(sigma) / (sq(sigma) + 0.09)\n"
-        )
-        basis, coefficient = ("(a + b * max(s, 0.0) / max(ci, co)) / PI",), ("kd",)
+        lines = dot + "a = 1.0 - 0.5 * sq(sigma) / (sq(sigma) + 0.33)\nb = 0.45 * sq(sigma) / (sq(sigma) + 0.09)\n"
+        bases: tuple[str, ...] = ("(a + b * max(s, 0.0) / max(ci, co)) / PI",)
+        coefficients: tuple[str, ...] = ("kd",)
     else:
         lines = dot + (
             "r = 2.0 / PI * sigma\nc1 = 1.0 / 2.0 - 2.0 / (3.0 * PI)\nc = c1 - 2.0 / 3.0 + 28.0 / (15.0 * PI)\n"
             "a = 1.0 / (1.0 + c1 * r)\nlost = c * r * a\n"
         )
-        basis = (
+        bases = (
             "a / PI * max(1.0 + r * choose(s > 0.0, s / max(ci, co), s), 0.0)",
             "a * r / (PI * PI * PI * c) * grooves_lose(ci) * grooves_lose(co)",
         )
-        coefficient = ("kd", "kd * kd * (1.0 - lost) / (1.0 - kd * lost)")
-    return TermSource(lines, basis, coefficient, "ci / PI", _COSINE, by_slopes=False)
+        coefficients = ("kd", "kd * kd * (1.0 - lost) / (1.0 - kd * lost)")
+    return TermSource(lines, bases, coefficients, "ci / PI", _COSINE, by_slopes=False)
 
 
 def _lafortune(model: Model, coloured: frozenset[str]) -> TermSource:
@@ -237,9 +236,7 @@ _SOURCES: Mapping[str, Callable[[Model, frozenset[str]], TermSource]] = {
     "blinn_phong": _power("({x} + 2.0) / (8.0 * PI) * power"),
     "cook_torrance": _microfacet(_KURT, "0.25 * d * min(1.0 / (ci * co), 4.0 / (hz * c2 * max(ci, co)))"),
     "lafortune": _lafortune,
-    "ashikhmin_premoze": _microfacet(
-        _GAUSSIAN, "e * c2 * sqrt(c2) / (PI * {x} * {y}) / (4.0 * (ci + co - ci * co))"
-    ),
+    "ashikhmin_premoze": _microfacet(_GAUSSIAN, "e * c2 * sqrt(c2) / (PI * {x} * {y}) / (4.0 * (ci + co - ci * co))"),
     "edwards": _edwards,
     "ggx": _smith(
         "d = sq(c2 / (1.0 + sq(p / {x}) + sq(q / {y}))) / (PI * {x} * {y})\n",

@@ -44,7 +44,7 @@ def write(material: Material, name: str, orientation: Orientation | None) -> Exp
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
     values = np.full((3, len(wi)), -1.0)
     with torch.no_grad():
-        for rows in np.array_split(np.flatnonzero(above), len(wi) // _CHUNK):
+        for rows in np.array_split(np.flatnonzero(above), max(1, len(wi) // _CHUNK)):
             f = material.f(torch.from_numpy(wi[rows]), torch.from_numpy(wo[rows]))
             values[:, rows] = f.expand(len(rows), 3).numpy().T / np.array(merl.SCALE)[:, None]
     at = nodes(material)

@@ -13,7 +13,7 @@ from ._export import Export, Exporter, Orientation, comment
 from ._language import number
 from ._shader import Shader
 
-_HEAD = '''
+_HEAD = """
 import math
 
 import drjit as dr
@@ -28,7 +28,7 @@ pow, atan, max, min, choose = dr.power, dr.atan2, dr.maximum, dr.minimum, dr.sel
 vec3 = mi.Color3f
 
 
-'''
+"""
 _CLASS = '''
 
 class {class_name}(mi.BSDF):

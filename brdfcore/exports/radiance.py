@@ -5,7 +5,7 @@
 
 L is the lobe `ashikhmin_shirley(constant, ks=1)`. Radiance's ashik2 is not the textbook's model: its diffuse term and
 its Schlick factor are of one cosine each. The colour of WGMDfunc's lobe is a modifier's, a colorfunc before it. The
-orientation is the direction, in the scene's coordinates, that the material's x axis has after projection on the surface.
+orientation is the direction, in the scene's coordinates, whose projection on the surface is the material's x axis.
 Materials reflect from the front and transmit nothing.
 Source: Radiance 6.0, rt/m_wgmdf.c and rt/ashikhmin.c; values checked by rtrace (tests/exports/test_radiance_export.py).
 """
@@ -59,7 +59,7 @@ def write(given: Material, name: str, orientation: Orientation | None) -> Export
 
 
 def _wgmd_values(given: Material) -> tuple[list[float], list[float], tuple[float, float]] | None:
-    """What WGMDfunc needs of a `lambert`, a `ward_bounded` or the two: kd, rs and the widths; None of other materials."""
+    """What WGMDfunc needs of `lambert`, `ward_bounded` or their sum: kd, rs and widths; None of other materials."""
     form, values = given.form, {key: value.detach() for key, value in given.values().items()}
     names = [term.model.name for term in form.terms]
     if len(set(names)) != len(names) or not set(names) <= {"lambert", "ward_bounded"}:
@@ -101,10 +101,10 @@ def _f(text: str, at: Nodes) -> Tensor:
             rs, (au, av), kd = numbers[1:4], numbers[8:10], numbers[18:21]
             made = material(f"lambert(kd={kd}) + ward_bounded(anisotropic, rs={rs}, ax={au!r}, ay={av!r})")
             return made.f(at.wi, at.wo)
-        d, s, shape = numbers[6:9], numbers[9:12], (numbers[12], numbers[13])
-        diffuse, lobe, fresnel = (basis[:, None] for basis in _ashik2_parts(at, shape))
-        d, s = (torch.tensor(colour, dtype=torch.float64) for colour in (d, s))
-        return d * diffuse + (s + (1 - s) * fresnel) * lobe
+        d, s = torch.tensor(numbers[6:12], dtype=torch.float64).reshape(2, 3)
+        diffuse, lobe, fresnel = (basis[:, None] for basis in _ashik2_parts(at, (numbers[12], numbers[13])))
+        f: Tensor = d * diffuse + (s + (1 - s) * fresnel) * lobe
+        return f
 
 
 def _is_number(word: str) -> bool:
@@ -147,7 +147,7 @@ _ASHIK2 = Family(_ashik2_bases, (1.0, 1e6))
 
 EXPORT = Exporter(
     name="radiance",
-    description="Radiance scene text: WGMDfunc, exact for lambert + ward_bounded; of others the nearest WGMDfunc or ashik2",
+    description="Radiance scene text; exact for lambert + ward_bounded, of others the nearest WGMDfunc or ashik2",
     suffix=".rad",
     media_type="text/plain",
     write=write,

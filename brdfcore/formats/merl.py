@@ -126,7 +126,8 @@ def bins(wi: Array, wo: Array) -> npt.NDArray[np.intp]:
     theta_d, phi_d = np.arctan2(np.hypot(x, y), z), np.arctan2(y, x) % math.pi
     at = [np.sqrt(theta_h / (math.pi / 2)), theta_d / (math.pi / 2), phi_d / math.pi]
     i, j, k = (np.clip((a * n).astype(int), 0, n - 1) for a, n in zip(at, SHAPE, strict=True))
-    return (i * SHAPE[1] + j) * SHAPE[2] + k
+    found: npt.NDArray[np.intp] = (i * SHAPE[1] + j) * SHAPE[2] + k
+    return found
 
 
 FORMAT = Format(

@@ -26,7 +26,7 @@ def pairs(material: bc.Material, seed: int, count: int = 400) -> tuple[torch.Ten
     return wi[above], wo[above], u[above]
 
 
-@pytest.mark.parametrize("coloured", [False, True], ids=["gray", "coloured"])
+@pytest.mark.parametrize("coloured", [True, pytest.param(False, marks=pytest.mark.full)])
 @pytest.mark.parametrize("choice", CHOICES)
 def test_values_are_the_models(choice, coloured):
     material = material_of(choice, coloured=coloured)
@@ -100,7 +100,9 @@ def test_every_model_has_a_source_or_says_why_not():
     for model in bc.MODELS.values():
         for choice in model.choices():
             if "compensated" in choice.options:
-                with pytest.raises(InvalidValueError, match=re.escape("got compensated, which needs a table. Export it")):
+                with pytest.raises(
+                    InvalidValueError, match=re.escape("got compensated, which needs a table. Export it")
+                ):
                     term_source(choice)
             else:
                 assert term_source(choice).bases

@@ -1,4 +1,4 @@
-"""Values against Radiance: its WGMDfunc is `lambert + ward_bounded`, its ashik2 documented though not the textbook's."""
+"""Values against Radiance: WGMDfunc is `lambert + ward_bounded`; ashik2 is documented, not the textbook's."""
 
 import numpy as np
 import pytest
