@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .models import MODELS, Model
     from .models.material import Material, material
     from .models.presets import PRESETS, Preset
+    from .tabulated import Tabulated
 
 __version__ = version("brdfcore")
 
@@ -49,6 +50,7 @@ __all__ = [
     "Preset",
     "Progress",
     "Samples",
+    "Tabulated",
     "__version__",
     "albedo",
     "albedo_table",
@@ -80,6 +82,7 @@ _MODULES = {
     ".models": ("MODELS", "Model"),
     ".models.material": ("Material", "material"),
     ".models.presets": ("PRESETS", "Preset"),
+    ".tabulated": ("Tabulated",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 

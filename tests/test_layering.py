@@ -24,6 +24,7 @@ FLOORS = [
     ["models"],
     ["hard_cases"],
     ["formats"],
+    ["tabulated"],
     ["sampling"],
     ["energy"],
     ["bounds"],

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import FormatError, unknown_name
-from . import cornell, delimited, merl, npz
+from . import cornell, delimited, merl, npz, rgl
 from ._format import Format
 from .delimited import write_csv
 from .samples import ANGLE_UNITS, QUANTITIES, Masked, Samples
 
 __all__ = ["ANGLE_UNITS", "FORMATS", "QUANTITIES", "Format", "Masked", "Samples", "read", "write_csv"]
 
-FORMATS: Final[dict[str, Format]] = {module.FORMAT.name: module.FORMAT for module in (delimited, cornell, merl, npz)}
+FORMATS: Final[dict[str, Format]] = {module.FORMAT.name: module.FORMAT for module in (delimited, cornell, merl, npz, rgl)}
 
 HEAD = 64 * 1024  # bytes by which a file's format is told; a longer preamble needs format=
 
