@@ -50,8 +50,9 @@ def albedo(
 
     theta in [0, pi/2) and phi, polar angle and azimuth of wo [rad], broadcast. The claimed `error` is at most
     tolerance * max(1, value) where `met` says so; 1e-12 is a reference. `METHODS` names the methods: "auto" takes the
-    cheapest for each term, the others are there to be compared; a measured grid is sampled (measured.py). Raises InvalidValueError for angles outside of the
-    range and a method that does not suit a term, UnknownNameError for a method that does not exist.
+    cheapest for each term, the others are there to be compared; a measured grid is sampled (measured.py). Raises
+    InvalidValueError for angles outside of the range and a method that does not suit a term, UnknownNameError for a
+    method that does not exist.
     """
     device = torch.device("cpu") if isinstance(material, Tabulated) else next(material.parameters()).device
     theta, phi = (torch.as_tensor(angle, dtype=torch.float64, device=device).detach() for angle in (theta, phi))

@@ -20,9 +20,7 @@ FEWEST, MOST = 2**8, 2**12  # points a scrambling
 ERRORS = 4.0  # standard errors that are claimed
 
 
-def of_table(
-    table: Tabulated, theta: Tensor, phi: Tensor, tolerance: float
-) -> tuple[Tensor, Tensor, int, float]:
+def of_table(table: Tabulated, theta: Tensor, phi: Tensor, tolerance: float) -> tuple[Tensor, Tensor, int, float]:
     """Values (..., C) and claimed errors (..., C) [1], evaluations, and seconds, for theta and phi (...) [rad]."""
     start = time.perf_counter()
     theta, phi = torch.broadcast_tensors(theta, phi)

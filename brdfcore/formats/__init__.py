@@ -15,7 +15,9 @@ from .samples import ANGLE_UNITS, QUANTITIES, Masked, Samples
 
 __all__ = ["ANGLE_UNITS", "FORMATS", "QUANTITIES", "Format", "Masked", "Samples", "read", "write_csv"]
 
-FORMATS: Final[dict[str, Format]] = {module.FORMAT.name: module.FORMAT for module in (delimited, cornell, merl, npz, rgl)}
+FORMATS: Final[dict[str, Format]] = {
+    module.FORMAT.name: module.FORMAT for module in (delimited, cornell, merl, npz, rgl)
+}
 
 HEAD = 64 * 1024  # bytes by which a file's format is told; a longer preamble needs format=
 

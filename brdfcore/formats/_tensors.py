@@ -1,4 +1,4 @@
-"""The container of RGL's `.bsdf` files: named arrays of numbers.
+r"""The container of RGL's `.bsdf` files: named arrays of numbers.
 
     12 bytes "tensor_file\\0", 2 bytes version 1.0, uint32 number of fields; then for each field
     uint16 length of the name, the name, uint16 dimensions, uint8 type, uint64 offset of the data, uint64 a dimension

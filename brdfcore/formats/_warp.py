@@ -73,7 +73,8 @@ class Warp:
 
     @property
     def _cells(self) -> int:
-        return (self.table.shape[1] - 1) * (self.table.shape[2] - 1)
+        height, width = self.table.shape[1:]
+        return int((height - 1) * (width - 1))
 
     def density(self, x: Array, y: Array, at: Corners) -> Array:
         """The density (N,) with which `sample` returns x, y."""
@@ -130,7 +131,7 @@ def _cell(x: Array, nodes: int) -> tuple[npt.NDArray[np.intp], Array]:
 
 
 def _root(mass: Array, a: Array, b: Array) -> Array:
-    """t in [0, 1] of a t + (b - a) t^2 / 2 = mass, the form of which nothing cancels."""
+    """The t in [0, 1] of a t + (b - a) t^2 / 2 = mass, the form of which nothing cancels."""
     inside = np.sqrt(np.maximum(a * a + 2 * mass * (b - a), 0))
     below = a + inside
     return np.clip(np.divide(2 * mass, below, out=np.zeros_like(mass), where=below > 0), 0, 1)

@@ -40,7 +40,7 @@ def sniff(head: bytes) -> bool:
 
 
 def stored_values(path: Path) -> Array:
-    """The numbers of a MERL file as they are stored, (3, bins), negative where invalid; FormatError if it is not whole."""
+    """What a MERL file stores, (3, bins), negative where it is invalid; FormatError where it is not whole."""
     bins = math.prod(SHAPE)
     expected, actual = 12 + 3 * bins * 8, path.stat().st_size
     with path.open("rb") as file:
@@ -80,7 +80,8 @@ def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
     masked = (Masked(_NEGATIVE, int(negative.sum())), Masked(_BELOW, int(below.sum())))
     if len(kept) == 0:
         raise FormatError(
-            f"Expected a MERL file to hold at least one valid bin, got {len(wi):,} invalid ones. Check that it is whole.",
+            f"Expected a MERL file to hold at least one valid bin, got {len(wi):,} invalid ones. "
+            "Check that it is whole.",
             field="values",
         )
     return Samples(
@@ -119,7 +120,7 @@ def grid() -> tuple[Array, Array, Array]:
 
 
 def bins(wi: Array, wo: Array) -> npt.NDArray[np.intp]:
-    """The bin, counted in the file's order, that holds each pair of directions (N, 3), as BRDFRead.cpp looks it up."""
+    """The bin, counted in the file's order, that holds each pair of directions (N, 3), as BRDFRead.cpp finds it."""
     places = (place.astype(int) for place in coordinates(wi, wo))
     i, j, k = (np.clip(place, 0, n - 1) for place, n in zip(places, SHAPE, strict=True))
     found: npt.NDArray[np.intp] = (i * SHAPE[1] + j) * SHAPE[2] + k

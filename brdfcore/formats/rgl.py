@@ -7,8 +7,8 @@
     luminance (P, T, h, w), and rgb (P, T, 3, h, w), or spectra (P, T, n, h, w) with wavelengths (n): S over u
     jacobian     whether D / (4 sigma) applies
 
-On the unit square a direction is (sqrt(2 theta / pi), (phi + pi) / (2 pi)), phi of the half vector relative to wi where
-the material is isotropic (P <= 2). wi here is the file's incident direction. `read` yields the samples at the file's own
+On the unit square a direction is (sqrt(2 theta / pi), (phi + pi) / (2 pi)), phi of the half vector relative to wi if
+the material is isotropic (P <= 2). wi is the file's incident direction. `read` yields the samples at the file's own
 nodes: at each wi, the directions of its w x h grid on u; so they crowd where the material reflects. Nodes with a
 direction at or below the horizon are masked. Values may be slightly negative, as measured.
 Source: Dupuy and Jakob 2018, "An adaptive parameterization for efficient material acquisition and rendering", ACM
@@ -111,7 +111,8 @@ class Rgl:
         cosine = (half * given).sum(-1)
         # the square's measure a solid angle of h, and dh / dw; floored as the authors floor it
         jacobian = np.maximum(2 * math.pi**2 * x * np.hypot(half[:, 0], half[:, 1]), 1e-6) * 4 * cosine
-        return density * self.luminance.density(u, v, at) / jacobian
+        found: Array = density * self.luminance.density(u, v, at) / jacobian
+        return found
 
     def sample(self, given: Array, u: Array, v: Array) -> Array:
         """Directions (N, 3) for a given one above the horizon and u, v in [0, 1]; some lie below the horizon."""
@@ -126,7 +127,8 @@ class Rgl:
         """The direction that mirrors wi at the half vector of a place on the unit square, (N, 3)."""
         theta, phi = x * x * (math.pi / 2), (2 * y - 1) * math.pi + (_azimuth(wi) if self.isotropic else 0.0)
         half = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
-        return 2 * (half * wi).sum(-1, keepdims=True) * half - wi
+        mirrored: Array = 2 * (half * wi).sum(-1, keepdims=True) * half - wi
+        return mirrored
 
 
 def sniff(head: bytes) -> bool:
@@ -179,7 +181,8 @@ def load(path: Path) -> Rgl:
             raise FormatError(f"Expected the .bsdf file to hold {name!r}, got none. It is no file of the RGL database.")
         if found[name].ndim != dimensions or 0 in found[name].shape:
             raise _misshapen(name, f"an array of {dimensions} dimensions", found[name].shape)
-        arrays[name] = found[name].astype(np.float64)
+        with np.errstate(invalid="ignore"):  # a signalling NaN, which the next check names
+            arrays[name] = found[name].astype(np.float64)
         if not np.isfinite(arrays[name]).all():
             raise FormatError(f"Expected {name} to be finite, got a value that is not. Fetch the file again.")
     values = arrays["spectra" if spectral else "rgb"]

@@ -45,7 +45,7 @@ class Tabulated:
                 name = detect(opened.read(HEAD))
             if name not in GRIDDED:
                 raise FormatError(
-                    f"Expected a file that is a grid ({' or '.join(GRIDDED)}), got {name}. Read it with bc.read and fit it.",
+                    f"Expected a file that is a grid ({' or '.join(GRIDDED)}), got {name}. Fit it with bc.fit.",
                     field="path",
                 )
             return cls(GRIDDED[name](file), file.name)
@@ -92,9 +92,7 @@ class Tabulated:
         normal = given.new_tensor([0.0, 0.0, 1.0])
         flat = torch.where(given[..., 2:] > 0, given, normal).detach().reshape(-1, 3).double().cpu().numpy()
         which, s, t = numbers.detach().reshape(-1, 3).double().cpu().numpy().T
-        own = np.concatenate([
-            self.grid.sample(flat[rows], s[rows], t[rows]) for rows in _rows(len(flat))
-        ] or [flat])
+        own = np.concatenate([self.grid.sample(flat[rows], s[rows], t[rows]) for rows in _rows(len(flat))] or [flat])
         radius, phi = np.sqrt(s), 2 * math.pi * t
         diffuse = np.stack([radius * np.cos(phi), radius * np.sin(phi), np.sqrt(1 - s)], -1)
         drawn = np.where((which < DIFFUSE)[:, None], diffuse, own)

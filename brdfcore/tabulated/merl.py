@@ -91,4 +91,5 @@ class MerlGrid:
         square = self._squares[at] + share * (self._squares[at + 1] - self._squares[at])
         sine, phi = np.sqrt(square), 2 * math.pi * v
         half = np.stack([sine * np.cos(phi), sine * np.sin(phi), np.sqrt(1 - square)], -1)
-        return 2 * (half * given).sum(-1, keepdims=True) * half - given
+        mirrored: Array = 2 * (half * given).sum(-1, keepdims=True) * half - given
+        return mirrored

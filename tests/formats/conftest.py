@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from format_cases import SMALL_MERL, cornell_bytes, csv_bytes, merl_bytes, npz_bytes
+from rgl_file import rgl_bytes
 
 from brdfcore.errors import BrdfError
 from brdfcore.formats import Samples, merl, read
@@ -21,7 +22,13 @@ def small_merl(monkeypatch: pytest.MonkeyPatch) -> tuple[int, int, int]:
 @pytest.fixture
 def examples(tmp_path: Path, small_merl: tuple[int, int, int]) -> dict[str, bytes]:
     """The bytes of a small good file of each format, by the format's name."""
-    return {"csv": csv_bytes(), "cornell": cornell_bytes(), "merl": merl_bytes(), "npz": npz_bytes(tmp_path)}
+    return {
+        "csv": csv_bytes(),
+        "cornell": cornell_bytes(),
+        "merl": merl_bytes(),
+        "npz": npz_bytes(tmp_path),
+        "rgl": rgl_bytes(),
+    }
 
 
 @pytest.fixture

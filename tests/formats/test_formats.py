@@ -80,7 +80,7 @@ def test_insisting_on_a_format_gives_its_own_complaint(examples: dict[str, bytes
     [
         (
             {"format": "cvs"},
-            "format to be a known name, got 'cvs'. Did you mean 'csv'? Known: csv, cornell, merl, npz.",
+            "format to be a known name, got 'cvs'. Did you mean 'csv'? Known: csv, cornell, merl, npz",
         ),
         ({"quantity": "btdf"}, "quantity to be a known name, got 'btdf'."),
         ({"angle_unit": "turns"}, "angle_unit to be a known name, got 'turns'."),
