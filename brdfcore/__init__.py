@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .models import MODELS, Model
     from .models.material import Material, material
     from .models.presets import PRESETS, Preset
-    from .tabulated import Tabulated
+    from .tabulated import Tabulated, lawrence
 
 __version__ = version("brdfcore")
 
@@ -63,6 +63,7 @@ __all__ = [
     "fit_batch",
     "hard_cases",
     "hemispherical_albedo",
+    "lawrence",
     "material",
     "plots",
     "read",
@@ -82,7 +83,7 @@ _MODULES = {
     ".models": ("MODELS", "Model"),
     ".models.material": ("Material", "material"),
     ".models.presets": ("PRESETS", "Preset"),
-    ".tabulated": ("Tabulated",),
+    ".tabulated": ("Tabulated", "lawrence"),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
