@@ -24,6 +24,13 @@ CHOICES = [
     for choice in model.choices()
     if "compensated" not in choice.options
 ]
+# the same, of which each model's first alone is tested by default
+FIRST = [
+    pytest.param(*case.values, id=case.id, marks=() if case.values[0] == model.choices()[0] else pytest.mark.full)
+    for model in bc.MODELS.values()
+    for case in CHOICES
+    if case.values[0].name == model.name
+]
 
 
 def material_of(choice: bc.Model, *, coloured: bool = False) -> bc.Material:

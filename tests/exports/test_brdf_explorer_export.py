@@ -35,7 +35,7 @@ def test_layout():
 
 
 @pytest.mark.skipif(COMPILER is None, reason="needs a GLSL compiler: glslangValidator")
-def test_every_model_compiles(tmp_path):
+def test_every_model_compiles(tmp_path, unmeasured):
     """In one run of the compiler."""
     kinds = {"color": "vec3", "float": "float"}
     paths = []

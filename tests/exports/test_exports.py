@@ -28,7 +28,7 @@ EXACT = [
 ]
 REFITTED = [
     "ashikhmin_shirley(n=30) + ashikhmin_shirley_diffuse(kd=[0.1, 0.2, 0.6], f0=ashikhmin_shirley.f0)",
-    "lambert(kd=0.1) + ggx(a=0.3, ks=[0.5, 0.6, 0.7])",
+    pytest.param("lambert(kd=0.1) + ggx(a=0.3, ks=[0.5, 0.6, 0.7])", marks=pytest.mark.full),
 ]
 
 

@@ -62,7 +62,7 @@ def check(material, bsdf, count):
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_every_model(choice, loaded):
+def test_every_model(choice, loaded, unmeasured):
     material = material_of(choice, coloured=True)
     check(material, loaded(material, f"one_{abs(hash(choice))}"), 30)
 
