@@ -19,14 +19,15 @@ import math
 import drjit as dr
 import mitsuba as mi
 
-if mi.variant() is None or not ("_rgb" in mi.variant() or {gray}):
-    raise ImportError(f"Expected a variant with RGB colours, got {{mi.variant()}}. Call mi.set_variant('llvm_ad_rgb').")
-
-PI = math.pi
+{check}PI = math.pi
 exp, log, sqrt, sin, cos, erf = dr.exp, dr.log, dr.sqrt, dr.sin, dr.cos, dr.erf
 pow, atan, max, min, choose = dr.power, dr.atan2, dr.maximum, dr.minimum, dr.select
 vec3 = mi.Color3f
 
+
+"""
+_CHECK = """if "_rgb" not in (mi.variant() or ""):
+    raise ImportError(f"Expected a variant with RGB colours, got {mi.variant()}. Call mi.set_variant('llvm_ad_rgb').")
 
 """
 _CLASS = '''
@@ -95,7 +96,7 @@ def write(material: Material, name: str, orientation: Orientation | None) -> Exp
         "values": values,
         "anisotropic": " | mi.BSDFFlags.Anisotropic" if anisotropic else "",
     }
-    text = comment(material, holds, found, "#") + _HEAD.format(gray=not shader.coloured)
+    text = comment(material, holds, found, "#") + _HEAD.format(check=_CHECK if shader.coloured else "")
     return Export("mitsuba", text + shader.python() + _CLASS.format(**parts), found, holds)
 
 

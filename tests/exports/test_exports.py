@@ -85,6 +85,9 @@ def test_the_difference_is_its_definition():
     w = weight[:, None, None] * weight[:, None] * ci**2
     expected = math.sqrt(float((w * (g - f) ** 2).sum() / (w * f**2).sum()))
     assert difference(ours, other.f) == pytest.approx(expected, rel=0.02)
+    at = nodes(ours)
+    mean = float((w * f**2).sum()) / 2 * (1 - low) / 2 * 2 * math.pi / 32  # over wo, of the integral over wi
+    assert float((at.weight * at.f[:, 0] ** 2).sum()) == pytest.approx(mean, rel=0.01)
 
 
 @pytest.mark.parametrize("isotropic", [True, pytest.param(False, marks=pytest.mark.full)])

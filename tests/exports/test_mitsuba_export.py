@@ -103,8 +103,15 @@ def test_the_density_integrates_to_what_is_not_lost(loaded):
 def test_a_coloured_plugin_says_which_variants_it_runs_in(tmp_path):
     path = tmp_path / "coloured.py"
     bc.export(bc.material("lambert(kd=[0.1, 0.2, 0.3])"), "mitsuba", path)
+    gray = tmp_path / "gray.py"
+    bc.export(bc.material("lambert(kd=0.3)"), "mitsuba", gray)
     mitsuba.set_variant("scalar_spectral")
     try:
+        exec(compile(gray.read_text(), str(gray), "exec"), {})
+        si = mitsuba.SurfaceInteraction3f()
+        si.wi = mitsuba.Vector3f(0, 0, 1)
+        value = mitsuba.load_dict({"type": "gray"}).eval(mitsuba.BSDFContext(), si, mitsuba.Vector3f(0.6, 0, 0.8))
+        assert list(value) == pytest.approx([0.3 / np.pi * 0.8] * 4)
         with pytest.raises(ImportError, match="Expected a variant with RGB colours, got scalar_spectral"):
             exec(compile(path.read_text(), str(path), "exec"), {})
     finally:
