@@ -74,9 +74,7 @@ def lobes(
         points.append(_points(samples, incidence, index, azimuth))
     turned = samples is not None and samples.azimuth_observed
     plane = f"azimuth {math.degrees(float(azimuth)):.0f}°" if turned else ""
-    return _draw(
-        curves, points, incidences, scale, title or _name(material), [f"channel {name}" * bool(name), plane]
-    )
+    return _draw(curves, points, incidences, scale, title or _name(material), [f"channel {name}" * bool(name), plane])
 
 
 def _name(material: "Material | Tabulated") -> str:
