@@ -13,8 +13,7 @@ divide by comes as a reciprocal, whose own derivative is then float64's affair. 
 exceeds twice its value, and no overflow meets a factor that is exactly 0 and makes a NaN.
 """
 
-from collections.abc import Iterable
-from functools import cached_property
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, cast
 
 import torch
@@ -81,6 +80,21 @@ def _to_single(x: Tensor) -> Tensor:
     return cast(Tensor, _ToSingle.apply(x))  # type: ignore[no-untyped-call]
 
 
+class _once:  # noqa: N801  -- a decorator
+    """A property that is computed once; functools' holds a lock up to Python 3.11, which torch.compile cannot enter."""
+
+    def __init__(self, compute: Callable[[Any], Tensor]) -> None:
+        self.compute = compute
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    def __get__(self, instance: object, owner: type) -> Tensor:
+        value = self.compute(instance)
+        instance.__dict__[self.name] = value
+        return value
+
+
 class _OnDemand:
     """Computes each quantity of a pair of float64 directions at most once."""
 
@@ -89,15 +103,15 @@ class _OnDemand:
         self.given = wi, wo
         self.floor = floor
 
-    @cached_property
+    @_once
     def normal(self) -> Tensor:
         return self.given[0].new_tensor([0.0, 0.0, 1.0])
 
-    @cached_property
+    @_once
     def wi(self) -> Tensor:
         return torch.where(self.above, self.given[0], self.normal)
 
-    @cached_property
+    @_once
     def wo(self) -> Tensor:
         return torch.where(self.above, self.given[1], self.normal)
 
@@ -117,75 +131,80 @@ class _OnDemand:
     def yo(self) -> Tensor:
         return self.wo[..., 1:2]
 
-    @cached_property
+    @_once
     def ci(self) -> Tensor:
         return self.wi[..., 2:].clamp(min=self.floor)
 
-    @cached_property
+    @_once
     def co(self) -> Tensor:
         return self.wo[..., 2:].clamp(min=self.floor)
 
-    @cached_property
+    @_once
     def hz(self) -> Tensor:
         return self.ci + self.co
 
-    @cached_property
+    @_once
     def over_ci(self) -> Tensor:
         return self.ci.reciprocal()
 
-    @cached_property
+    @_once
     def over_co(self) -> Tensor:
         return self.co.reciprocal()
 
-    @cached_property
+    @_once
     def over_hz(self) -> Tensor:
         return self.hz.reciprocal()
 
-    @cached_property
+    @_once
     def over_h_dot_wo(self) -> Tensor:
         return self.h_dot_wo.reciprocal()
 
-    @cached_property
+    @_once
     def hx(self) -> Tensor:
         return self.xi + self.xo
 
-    @cached_property
+    @_once
     def hy(self) -> Tensor:
         return self.yi + self.yo
 
-    @cached_property
+    @_once
     def p(self) -> Tensor:
         return self.hx / self.hz
 
-    @cached_property
+    @_once
     def q(self) -> Tensor:
         return self.hy / self.hz
 
-    @cached_property
+    @_once
     def e2(self) -> Tensor:
         return self.p.square() + self.q.square()
 
     @property
     def ux(self) -> Tensor:
-        return self.hx / (2 * self.h_dot_wo)
+        return self.hx / self.norm
 
     @property
     def uy(self) -> Tensor:
-        return self.hy / (2 * self.h_dot_wo)
+        return self.hy / self.norm
 
     @property
     def uz(self) -> Tensor:
-        return self.hz / (2 * self.h_dot_wo)
+        return self.hz / self.norm
 
-    @cached_property
+    @_once
+    def norm(self) -> Tensor:
+        return torch.sqrt(self.hx.square() + self.hy.square() + self.hz.square())
+
+    @_once
     def h_dot_wo(self) -> Tensor:
-        return 0.5 * torch.sqrt(self.hx.square() + self.hy.square() + self.hz.square())
+        return 0.5 * self.norm
 
 
 def geometry(wi: Directions, wo: Directions, needs: Iterable[str]) -> Geometry:
     """The quantities that `needs` names, for directions of one floating dtype; raises for other dtypes and shapes."""
     check_directions("wi", wi)
     check_directions("wo", wo)
+    check_broadcast("wi and wo", wi, wo, field="wo")
     dtype = torch.promote_types(wi.dtype, wo.dtype)
     on_demand = _OnDemand(wi.double(), wo.double(), FLOOR[dtype])
     quantities = {name: getattr(on_demand, name) for name in needs}
@@ -211,6 +230,20 @@ def check_directions(name: str, w: Tensor) -> None:
         raise InvalidValueError(
             f"Expected {name} to be float32 or float64, got {w.dtype}. Convert it with {name}.float().", field=name
         )
+
+
+def check_broadcast(names: str, *tensors: Tensor, field: str) -> None:
+    """Raise InvalidValueError where tensors, in words `names`, have shapes that do not broadcast."""
+    shapes = [tuple(tensor.shape) for tensor in tensors]
+    if len(set(shapes)) > 1:
+        try:
+            torch.broadcast_shapes(*shapes)
+        except RuntimeError:
+            raise InvalidValueError(
+                f"Expected {names} to have shapes that broadcast, got {' and '.join(map(str, shapes))}. "
+                "Make their leading axes equal, or of length 1.",
+                field=field,
+            ) from None
 
 
 def from_angles(theta: Tensor, phi: Tensor) -> Directions:

@@ -1,35 +1,94 @@
 """The ASGI application, and the server around it."""
 
 import contextlib
+import json
+import logging
+import time
 from collections.abc import AsyncIterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
+from starlette.types import ASGIApp
 
 import brdfcore as bc
 
-from . import errors
+from . import errors, examples
 from .datasets import Datasets
+from .guard import Guard, JsonLines
 from .jobs.dispatcher import Dispatcher
-from .jobs.runner import LocalRunner
+from .jobs.runner import LocalRunner, Runner
 from .jobs.store import JobStore
+from .metrics import Metrics
 from .routes import ROUTERS
 from .settings import Settings
 from .state import State
+
+_log = logging.getLogger("service")
+
+
+def _runner(settings: Settings) -> Runner:
+    """What computes: this machine's processes, or a Ray cluster where one is named."""
+    if not settings.ray_address:
+        return LocalRunner(settings.data, settings.fit_memory)
+    from .jobs.ray_runner import RayRunner  # a cluster is rarely there, and Ray is heavy
+
+    return RayRunner(
+        settings.ray_address, settings.data, settings.fit_memory, cpus=settings.ray_cpus, gpus=settings.ray_gpus
+    )
+
+
+class _App(FastAPI):
+    """An application inside the guard, whose 500s carry what every answer does."""
+
+    def openapi(self) -> dict[str, Any]:
+        """The OpenAPI document, with an example for every operation."""
+        if self.openapi_schema is None:
+            self.openapi_schema = examples.shown(super().openapi())
+        return self.openapi_schema
+
+    def build_middleware_stack(self) -> ASGIApp:
+        """The application that the server calls."""
+        return Guard(super().build_middleware_stack(), self.state.settings, self.state.metrics)
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
     """The application; while it runs, so do its fits. Without settings the environment's hold."""
     chosen = settings or Settings.from_environment()
+    metrics = Metrics()
 
     @contextlib.asynccontextmanager
     async def running(app: FastAPI) -> AsyncIterator[None]:
         datasets = Datasets(chosen.data)
         store = JobStore(chosen.data / "jobs.sqlite3")
-        runner = LocalRunner(chosen.data, chosen.fit_memory)
+        runner = _runner(chosen)
+        metrics.watch(store)
+
+        def sweep() -> None:
+            if chosen.keep_days:
+                before = time.time() - 86400 * chosen.keep_days
+                jobs, files = store.forget(before), datasets.forget(before, store.asks_for)
+                _log.info("removed %d jobs and %d datasets older than %g days", jobs, files, chosen.keep_days)
+
+        def ended(job_id: str, reason: str) -> None:
+            job = store.get(job_id)
+            if job is None:
+                return
+            if reason:
+                metrics.failed(job.kind, reason)
+            else:
+                model = json.loads(job.request).get("model", "")
+                metrics.succeeded(job.kind, model, (job.finished or 0.0) - (job.started or 0.0))
+
         dispatcher = Dispatcher(
-            store, runner, chosen.data / "lock", workers=chosen.workers, fit_seconds=chosen.fit_seconds
+            store,
+            runner,
+            chosen.data / "lock",
+            workers=chosen.workers,
+            fit_seconds=chosen.fit_seconds,
+            sweep=sweep,
+            ended=ended,
         )
         dispatcher.start()
         try:
@@ -41,8 +100,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             store.close()
 
     summary = "Reflectance models fitted to measurements, with intervals, errors and lobe plots."
-    app = FastAPI(title="brdfcore", version=bc.__version__, summary=summary, lifespan=running)
+    app = _App(title="brdfcore", version=bc.__version__, summary=summary, lifespan=running)
     app.state.ending = lambda: False
+    app.state.metrics, app.state.settings = metrics, chosen
     errors.install(app)
     for router in ROUTERS:
         app.include_router(router)
@@ -51,6 +111,12 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 def server(settings: Settings) -> uvicorn.Server:
     """A server of the application; told to end, it does so within 5 s, and unfinished fits stay queued."""
+    settings.check_open()
+    lines = logging.StreamHandler()
+    lines.setFormatter(JsonLines())
+    _log.handlers = [lines]
+    _log.propagate = False
+    _log.setLevel(settings.log_level.upper())
     app = create_app(settings)
     config = uvicorn.Config(
         app,

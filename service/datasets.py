@@ -15,7 +15,7 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -88,6 +88,19 @@ class Datasets:
             return DatasetView.model_validate_json((self._kept / name / "about.json").read_bytes())
         except FileNotFoundError:
             return None
+
+    def forget(self, before: float, asked_for: Callable[[str], bool]) -> int:
+        """How many datasets were uploaded before that time [s since 1970] and no job asks for; they are removed."""
+        old = [f for f in self._kept.iterdir() if f.stat().st_mtime < before and not asked_for(f.name)]
+        for folder in old:
+            shutil.rmtree(folder, ignore_errors=True)
+        return len(old)
+
+    def files(self, name: str) -> dict[str, bytes]:
+        """What is kept of a dataset, by its paths under the data folder; nothing where there is none."""
+        if self.get(name) is None:
+            return {}
+        return {f"datasets/{name}/{file.name}": file.read_bytes() for file in (self._kept / name).iterdir()}
 
     def samples(self, request: FitRequest) -> Samples:
         """The samples that a fit's request means, inline or uploaded."""

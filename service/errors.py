@@ -5,6 +5,7 @@ ProblemError              the status and the sentence of the route that raised i
 RequestValidationError    422, `errors` lists every field at fault
 404, 405 (with Allow)     from the router
 anything else             500, details in the log only
+and before any route      401 without a known key, 431 for too large headers (guard.py)
 """
 
 import http
@@ -51,7 +52,8 @@ def install(app: FastAPI) -> None:
 def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """What OpenAPI says of a route's errors."""
     content = {PROBLEM_TYPE: {"schema": inlined(Problem)}}
-    return {status: {"description": http.HTTPStatus(status).phrase, "content": content} for status in statuses}
+    every = (401, 431, *statuses)  # the guard's come before any route
+    return {status: {"description": http.HTTPStatus(status).phrase, "content": content} for status in every}
 
 
 def inlined(model: type[BaseModel]) -> dict[str, Any]:

@@ -57,6 +57,15 @@ class ProgressView(View):
     loss: float | None
 
 
+class ProgressEvent(View):
+    """How a job stands, as its events tell it."""
+
+    status: JobStatus
+    progress: ProgressView | None
+    error: str | None
+    attempts: int
+
+
 class JobView(View):
     """What every job shows of itself."""
 
@@ -65,6 +74,7 @@ class JobView(View):
     progress: ProgressView | None
     error: str | None = Field(description="why it failed, in one sentence")
     attempts: int = Field(description="how often it was started")
+    reused: str | None = Field(None, description="the earlier job of the same work, whose result this is")
     created: datetime
     started: datetime | None
     finished: datetime | None
@@ -120,12 +130,9 @@ class InlineSamples(DirectionPairs):
         return self
 
 
-class FitRequest(Body):
-    """What to fit to which data; data is either the id of a dataset or inline samples."""
+class FitOptions(Body):
+    """How to fit, whatever the data and the model are."""
 
-    dataset: str | None = Field(None, description="id that POST /v1/datasets gave")
-    samples: InlineSamples | None = None
-    model: str = Field(min_length=1, max_length=2000, description="for example lambert + ward_bounded")
     loss: str = "cosine"
     optimizer: str = "auto"
     fixed: dict[str, PerChannel] = Field({}, description='held values, such as {"kurt.f0": 0.04}')
@@ -139,6 +146,14 @@ class FitRequest(Body):
     max_theta_deg: float | None = Field(None, gt=0, le=90, description="steeper samples are left out [degrees]")
     conserve_energy: bool = Field(False, description="keep every directional albedo at 1 or below")
 
+
+class FitRequest(FitOptions):
+    """What to fit to which data; data is either the id of a dataset or inline samples."""
+
+    dataset: str | None = Field(None, description="id that POST /v1/datasets gave")
+    samples: InlineSamples | None = None
+    model: str = Field(min_length=1, max_length=2000, description="for example lambert + ward_bounded")
+
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         if (self.dataset is None) == (self.samples is None):
@@ -149,6 +164,21 @@ class FitRequest(Body):
         """What `brdfcore.fit` and its check are asked, by keyword: everything but the data."""
         found = self.model_dump(exclude={"dataset", "samples", "max_theta_deg"})
         return {**found, "max_theta": None if self.max_theta_deg is None else math.radians(self.max_theta_deg)}
+
+
+class BatchRequest(FitOptions):
+    """One or several models to fit to many datasets, all with the same options."""
+
+    datasets: list[str] = Field(min_length=1, max_length=1000, description="ids that POST /v1/datasets gave")
+    models: list[Annotated[str, Field(min_length=1, max_length=2000)]] = Field(min_length=1, max_length=20)
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Self:
+        for name in ("datasets", "models"):
+            given = getattr(self, name)
+            if len(set(given)) < len(given):
+                raise ValueError(f"Expected {name} to be given once each, got one of them twice. Leave it out.")
+        return self
 
 
 class EvaluationRequest(DirectionPairs):
@@ -376,6 +406,46 @@ class FitPage(View):
     """Fits, newest first; `next` is the cursor of the page that follows."""
 
     items: list[FitSummary]
+    next: str | None
+
+
+class BatchRow(View):
+    """One fit of a batch, in the order of datasets, then of models."""
+
+    dataset: str
+    model: str
+    fit: str = Field(description="id of the fit")
+    status: JobStatus
+    fit_status: Literal["converged", "stopped_early"] | None
+    errors: dict[str, float | None] | None
+    parameters: dict[str, float | list[float | None] | None] | None
+    undetermined: list[str] | None
+    seconds: float | None
+    error: str | None = Field(description="why it failed, in one sentence")
+
+
+class BatchView(View):
+    """Fits that were submitted together: one progress, one table."""
+
+    id: str
+    created: datetime
+    datasets: int
+    models: list[str]
+    finished: bool = Field(description="whether no fit of it is queued or running")
+    fraction: float = Field(description="of the work that is done")
+    counts: dict[JobStatus, int]
+
+
+class BatchTable(View):
+    """The fits of a batch."""
+
+    rows: list[BatchRow]
+
+
+class BatchPage(View):
+    """Batches, newest first; `next` is the cursor of the page that follows."""
+
+    items: list[BatchView]
     next: str | None
 
 

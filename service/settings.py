@@ -1,5 +1,6 @@
 """What the operator may set, from arguments or from the environment variables BRDF_DATA, BRDF_HOST and so on."""
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -7,6 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from brdfcore.errors import InvalidValueError
+
+from .keys import hashes
+
+LOG_LEVELS = ("debug", "info", "warning", "error")
 
 
 @dataclass(frozen=True)
@@ -21,6 +26,13 @@ class Settings:
                     directions that POST /v1/evaluate takes
     fit_seconds     longest that one attempt at a fit or a table may run [s]
     fit_memory      most memory that one attempt may allocate [bytes]
+    ray_address     of a Ray cluster whose nodes compute instead of this machine's processes; empty for these
+    ray_cpus, ray_gpus   what one job takes of the cluster; fractions share a GPU
+    queue_limit     unfinished jobs that one key, or everybody without keys, may have
+    keep_days       ended jobs, and datasets that no job is of, are removed after so many days; 0 keeps them for ever
+    api_keys        keys that are let in, as their SHA-256; without any, everybody is. The variable holds the keys
+                    themselves, or sha256:HEX, with commas between
+    log_level       debug, info (a line for every request), warning or error; the log is JSON lines on standard error
     """
 
     data: Path = Path("brdf-data")
@@ -31,13 +43,41 @@ class Settings:
     inline_rows: int = 10_000
     fit_seconds: float = 3600.0
     fit_memory: int = 8 * 2**30
+    ray_address: str = ""
+    ray_cpus: float = 1.0
+    ray_gpus: float = 0.0
+    queue_limit: int = 1000
+    keep_days: float = 0.0
+    api_keys: tuple[str, ...] = field(default=(), repr=False, metadata={"read": hashes})
+    log_level: str = "warning"
 
     def __post_init__(self) -> None:
-        for name in ("workers", "upload_limit", "inline_rows", "fit_seconds", "fit_memory"):
+        for name in ("workers", "upload_limit", "inline_rows", "fit_seconds", "fit_memory", "queue_limit"):
             if not getattr(self, name) > 0:
                 raise _refused(name, "above 0", getattr(self, name))
         if not 0 <= self.port <= 65535:
             raise _refused("port", "within 0..65535", self.port)
+        for name in ("ray_cpus", "ray_gpus"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise _refused(name, "0 or more", getattr(self, name))
+        if not 0 <= self.keep_days < math.inf:
+            raise _refused("keep_days", "0 or more", self.keep_days)
+        if self.log_level not in LOG_LEVELS:
+            raise _refused("log_level", f"one of {', '.join(LOG_LEVELS)}", self.log_level)
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only this machine reaches the service."""
+        return self.host.startswith("127.") or self.host in ("localhost", "::1")
+
+    def check_open(self) -> None:
+        """Refuse to be open to other machines without a key."""
+        if not self.loopback and not self.api_keys:
+            raise InvalidValueError(
+                f"Expected an API key, since {self.host} is open to other machines, got none. Set BRDF_API_KEYS, for "
+                "example to the output of: openssl rand -hex 24; or listen on 127.0.0.1.",
+                field="api_keys",
+            )
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ, **given: Any) -> "Settings":
@@ -46,7 +86,8 @@ class Settings:
         for setting in fields(cls):
             text = environment.get(f"BRDF_{setting.name.upper()}")
             if text is not None and setting.name not in values:
-                values[setting.name] = _converted(setting.name, setting.type, text)
+                read = setting.metadata.get("read")
+                values[setting.name] = read(text) if read else _converted(setting.name, setting.type, text)
         return cls(**values)
 
 

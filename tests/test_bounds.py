@@ -453,6 +453,13 @@ def test_the_peak_over_a_rectangle_of_slopes_is_the_largest_value(ax, ay, power)
 # --- refusals --------------------------------------------------------------------------------------------------------
 
 
+def test_a_text_in_the_place_of_a_material_is_refused():
+    expected = r"^Expected material to be a Material, got str\. Make one with bc\.material\(text\)\.$"
+    with pytest.raises(bc.errors.InvalidValueError, match=expected) as e:
+        bc.bounds.maximum("ward", at(30), box((-1, -1, 0.5), (1, 1, 1)))
+    assert e.value.field == "material"
+
+
 def test_a_model_without_a_bound_is_refused(monkeypatch):
     monkeypatch.delitem(bc.bounds.BOUNDS, "ward")
     with pytest.raises(
@@ -476,6 +483,24 @@ BAD_BOXES = [
 def test_corners_that_make_no_box_are_refused(low, high, message):
     with pytest.raises(bc.errors.InvalidValueError, match=message) as e:
         bc.bounds.maximum(bc.material("ward"), at(30), (low, high))
+    assert e.value.field == "box"
+
+
+@pytest.mark.parametrize("box", [None, 3.0, "kurt", (torch.zeros(3),), (torch.zeros(3),) * 3, (None, None)], ids=str)
+def test_what_is_no_box_is_refused(box):
+    with pytest.raises(
+        bc.errors.InvalidValueError, match=r"^Expected the box to be two corners, \(low, high\), got "
+    ) as e:
+        bc.bounds.maximum(bc.material("ward"), at(30), box)
+    assert e.value.field == "box"
+
+
+def test_a_box_a_direction_too_few_is_refused():
+    low = torch.zeros(4, 3)
+    with pytest.raises(
+        bc.errors.InvalidValueError, match=r"^Expected wi and the box to have shapes that broadcast, "
+    ) as e:
+        bc.bounds.maximum(bc.material("ward"), at(30).expand(5, 3), (low, low + 1))
     assert e.value.field == "box"
 
 

@@ -1,7 +1,9 @@
 """Half vectors, slopes and cosines: exact to the horizon, safe below it, computed on demand."""
 
+import importlib.util
 import math
 import re
+import sys
 
 import jaxtyping
 import mpmath
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 import torch
 
+from brdfcore import geometry as module
 from brdfcore.errors import InvalidValueError
 from brdfcore.geometry import FLOOR, QUANTITIES, Geometry, from_angles, geometry, reflect
 
@@ -127,6 +130,24 @@ def test_gradcheck_of_every_quantity():
     wi, wo = unit(rng, 4, 0.1).requires_grad_(), unit(rng, 4, 0.1).requires_grad_()
     for name in sorted(QUANTITIES):
         assert torch.autograd.gradcheck(lambda a, b, name=name: getattr(geometry(a, b, {name}), name), (wi, wo))
+
+
+@pytest.mark.filterwarnings("ignore:.*should not be instantiated:DeprecationWarning")  # dynamo's own doing
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_to_a_compiler_it_is_one_graph(dtype, monkeypatch):
+    """Pieces that are evaluated apart would cost the compiled forms most of their speed.
+
+    As it is shipped: the tests' type checks are no code to compile.
+    """
+    spec = importlib.util.spec_from_file_location("brdfcore.geometry_as_shipped", module.__file__)
+    shipped = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, spec.name, shipped)
+    spec.loader.exec_module(shipped)
+    rng = np.random.default_rng(85)
+    wi, wo = unit(rng, 5).to(dtype), unit(rng, 3).to(dtype)[:, None]
+    compiled = torch.compile(lambda wi, wo: shipped.geometry(wi, wo, QUANTITIES), fullgraph=True, backend="eager")
+    for got, expected in zip(compiled(wi, wo), geometry(wi, wo, QUANTITIES), strict=True):
+        assert torch.equal(got, expected)
 
 
 def test_only_what_is_asked_for_is_computed():

@@ -225,6 +225,13 @@ def test_it_says_what_it_cost():
 # --- refusals --------------------------------------------------------------------------------------------------------
 
 
+def test_a_text_in_the_place_of_a_material_is_refused():
+    expected = r"^Expected material to be a Material, got str\. Make one with bc\.material\(text\)\.$"
+    with pytest.raises(bc.errors.InvalidValueError, match=expected) as e:
+        bc.sampling.efficiency("ward", at(30))
+    assert e.value.field == "material"
+
+
 def test_directions_below_the_horizon_are_refused():
     wo = torch.stack([at(30)[0], torch.tensor([1.0, 0.0, 0.0], dtype=torch.float64)])
     with pytest.raises(bc.errors.InvalidValueError, match=r"above the horizon, got \[1\.0, 0\.0, 0\.0\]") as e:
@@ -234,7 +241,27 @@ def test_directions_below_the_horizon_are_refused():
         bc.sampling.efficiency(bc.material("ward"), at(30).half())
 
 
+def test_directions_that_are_no_numbers_are_refused():
+    wo = torch.tensor([math.nan, 0.0, 1.0])
+    with pytest.raises(
+        bc.errors.InvalidValueError, match=r"finite and above the horizon, got \[nan, 0\.0, 1\.0\]"
+    ) as e:
+        bc.sampling.efficiency(bc.material("ward"), wo)
+    assert e.value.field == "wo"
+
+
+@pytest.mark.parametrize("count", ["a", 2.5, None, True])
+def test_a_count_that_is_no_whole_number_is_refused(count):
+    with pytest.raises(
+        bc.errors.InvalidValueError, match="Expected count to be a whole number of at least 2, got"
+    ) as e:
+        bc.sampling.efficiency(bc.material("ward"), at(30), count=count)
+    assert e.value.field == "count"
+
+
 def test_one_sample_is_refused():
-    with pytest.raises(bc.errors.InvalidValueError, match="Expected count to be at least 2, got 1") as e:
+    with pytest.raises(
+        bc.errors.InvalidValueError, match="Expected count to be a whole number of at least 2, got 1"
+    ) as e:
         bc.sampling.efficiency(bc.material("ward"), at(30), count=1)
     assert e.value.field == "count"

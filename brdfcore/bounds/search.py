@@ -17,8 +17,8 @@ from torch import Tensor
 
 from .._types import Directions, Spectrum
 from ..errors import InvalidValueError
-from ..geometry import FLOOR, check_directions
-from ..models.material import Material
+from ..geometry import FLOOR, check_broadcast, check_directions
+from ..models.material import Material, check_material
 from .pieces import Interval, faces, middle_of, pieces_of
 from .terms import BOUNDS, OPTIONS
 
@@ -39,6 +39,7 @@ def maximum(material: Material, wi: Directions, box: tuple[Tensor, Tensor]) -> S
     over the hemisphere. The bound is finite for every wi above the horizon (float32 may overflow), and 0 for others.
     Raises InvalidValueError for a model or option that has no bound, and for corners that make no box.
     """
+    check_material(material)
     check_directions("wi", wi)
     low, high = _corners(wi, box)
     for term in material.form.terms:
@@ -58,7 +59,13 @@ def maximum(material: Material, wi: Directions, box: tuple[Tensor, Tensor]) -> S
 
 def _corners(wi: Tensor, box: tuple[Tensor, Tensor]) -> Interval:
     """The box's corners in double precision, or an error."""
-    low, high = (torch.as_tensor(corner, dtype=torch.float64, device=wi.device) for corner in box)
+    try:
+        low, high = (torch.as_tensor(corner, dtype=torch.float64, device=wi.device) for corner in box)
+    except (TypeError, ValueError, RuntimeError):
+        got = f"{len(box)} of them" if isinstance(box, tuple | list) and len(box) != 2 else repr(box)
+        raise InvalidValueError(
+            f"Expected the box to be two corners, (low, high), got {got}. Pass each as (3,) or (..., 3).", field="box"
+        ) from None
     for name, corner in (("low", low), ("high", high)):
         if corner.ndim == 0 or corner.shape[-1] != 3:
             raise InvalidValueError(
@@ -72,6 +79,7 @@ def _corners(wi: Tensor, box: tuple[Tensor, Tensor]) -> Interval:
                 f"Expected {name} to be finite, got {value[~value.isfinite()][0].item()}. Give it finite numbers.",
                 field="wi" if name == "wi" else "box",
             )
+    check_broadcast("wi and the box", wi, low, high, field="box")
     swapped = low > high
     if bool(swapped.any()):
         a, b = (corner.expand_as(swapped)[swapped][0].item() for corner in (low, high))

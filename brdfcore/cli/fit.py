@@ -3,7 +3,7 @@
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ..fitting import Fit, Progress
+
+T = TypeVar("T")
 
 
 def command(
@@ -36,38 +38,71 @@ def command(
     plot: Annotated[Path | None, typer.Option(help="Write the lobe plot to this .svg or .png file.")] = None,
     scale: Annotated[str, typer.Option(help="Of the plot's radius: linear, cube_root or log.")] = "linear",
     channel: Annotated[str | None, typer.Option(help="The channel that is plotted; else the brightest.")] = None,
+    server: Annotated[str | None, typer.Option(help="Let the service at this URL do the work.")] = None,
+    api_key: Annotated[str | None, typer.Option(envvar="BRDF_API_KEY", help="The key that it asks for.")] = None,
 ) -> None:
     """Fit a material to a measured file; print parameters with 95 % intervals, errors and cost."""
+    asked: dict[str, Any] = {
+        "model": model,
+        "loss": loss,
+        "optimizer": optimizer,
+        "fixed": dict(_pair(text) for text in fixed or []),
+        "gray": gray or (),
+        "per_channel": per_channel or (),
+        "seed": seed,
+        "bounds": dict(_range(text) for text in bounds or []),
+        "robust": robust,
+        "robust_scale": robust_scale,
+        "conserve_energy": conserve_energy,
+    }
+    declared = {"format": format_, "quantity": quantity, "angle_unit": angle_unit}
+    if server is not None:
+        drawn = {"scale": scale, "channel": channel}
+        _remote(server, api_key, file, asked | declared | {"max_theta_deg": max_theta_deg}, as_json, plot, drawn)
+        return
     import brdfcore as bc
 
     if plot is not None:  # what cannot be drawn is refused before the work, not after it
         bc.plots.kind_of(plot)
         bc.plots.check_scale(scale)
-    samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit)
+    max_theta = None if max_theta_deg is None else math.radians(max_theta_deg)
+    samples = bc.read(file, **declared)
 
     def run(progress: "Callable[[Progress], None] | None") -> "Fit":
-        return bc.fit(
-            samples,
-            model,
-            loss=loss,
-            optimizer=optimizer,
-            fixed=dict(_pair(text) for text in fixed or []),
-            gray=gray or (),
-            per_channel=per_channel or (),
-            seed=seed,
-            bounds=dict(_range(text) for text in bounds or []),
-            robust=robust,
-            robust_scale=robust_scale,
-            max_theta=None if max_theta_deg is None else math.radians(max_theta_deg),
-            conserve_energy=conserve_energy,
-            progress=progress,
-        )
+        return bc.fit(samples, **asked, max_theta=max_theta, progress=progress)
 
     result = _with_bar(run)
     typer.echo(json.dumps(result.to_dict(), indent=2) if as_json else result.report())
     if plot is not None:
         figure = bc.plots.lobes(result.material, samples, scale=scale, channel=channel)
         typer.echo(f"Lobe plot: {bc.plots.save(figure, plot)}", err=as_json)
+
+
+def _remote(
+    server: str,
+    api_key: str | None,
+    file: Path,
+    asked: dict[str, Any],
+    as_json: bool,
+    plot: Path | None,
+    drawn: dict[str, Any],
+) -> None:
+    """The same, done by a service."""
+    from service.client import Client, ClientError
+
+    from .. import plots
+    from ..errors import BrdfError
+
+    kind = "svg" if plot is None else plots.kind_of(plot)
+    try:
+        with Client(server, api_key) as client:
+            fit = _with_bar(lambda progress: client.fit(file, **asked, progress=progress))
+            typer.echo(fit.result.model_dump_json(indent=2) if as_json else fit.report())
+            if plot is not None:
+                plot.write_bytes(fit.plot("lobes", kind, **drawn))
+                typer.echo(f"Lobe plot: {plot}", err=as_json)
+    except ClientError as error:
+        raise BrdfError(str(error)) from error
 
 
 def _pair(text: str) -> tuple[str, float]:
@@ -97,7 +132,7 @@ def _range(text: str) -> tuple[str, tuple[float, float]]:
         ) from error
 
 
-def _with_bar(run: "Callable[[Callable[[Progress], None] | None], Fit]") -> "Fit":
+def _with_bar(run: "Callable[[Callable[[Any], None] | None], T]") -> T:
     """The result of `run`, which gets a progress callback; the bar shows on a terminal's error output only."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

@@ -24,12 +24,14 @@ def command(
     from service.settings import Settings
 
     settings = Settings.from_environment(host=host, port=port, data=data)
+    settings.check_open()
     settings.data.mkdir(parents=True, exist_ok=True)
     with _bound(settings) as listener:
         typer.echo(f"Service: {_url(listener)}  (its documentation: {_url(listener)}/docs)")
         typer.echo(f"Data:    {settings.data.resolve()}")
-        if not settings.host.startswith("127.") and settings.host not in ("localhost", "::1"):
-            typer.echo("Open to other machines: anyone who reaches this address can use the service.", err=True)
+        keys = len(settings.api_keys)
+        who = "this machine only" if settings.loopback else "other machines too"
+        typer.echo(f"Open to: {who}, {f'with one of {keys} API keys' if keys else 'without a key'}")
         server(settings).run(sockets=[listener])
 
 

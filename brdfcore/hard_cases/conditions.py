@@ -60,9 +60,6 @@ CONDITION: dict[str, Condition] = {
 # In units of the eps of double precision, in which this is summed whatever the directions' precision is.
 IN_DOUBLE: dict[str, Condition] = {
     "lafortune": _lafortune,
-    # Rounding turns the half vector by eps / |wi + wo|. The other lobes hide that in derivatives as large as
-    # f / (ci + co), or in a distribution that is 0 where it would show.
-    "ggx(separable)": lambda s, v: 1 / s.cos_d,
 }
 
 

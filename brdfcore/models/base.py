@@ -132,14 +132,10 @@ class Model(ABC):
                 raise unknown_name(f"a parameter of {cls.name}", name, known, field="model")
         fitting = [m for m in choices if set(words) <= set(m.options) and set(names) <= set(m.parameter)]
         if not fitting:
-            offered = "; ".join(
-                f"{cls.name}({', '.join(m.options)}) has {', '.join(m.parameter)}"
-                for m in choices
-                if set(words) <= set(m.options)
-            )
+            belongs = "; ".join(f"{name} belongs to {where}" for name in names if (where := cls._declared_by(name)))
             raise ModelTextError(
                 f"Expected the options and parameters of {cls.name} to agree, got {', '.join([*words, *names])}. "
-                f"Drop one of them: {offered}.",
+                f"Drop one of them: {belongs}.",
                 field="model",
             )
         return fitting
@@ -174,6 +170,14 @@ class Model(ABC):
             ],
             "reciprocal": cls.reciprocal,
         }
+
+    @classmethod
+    def _declared_by(cls, name: str) -> str:
+        """The options that declare a parameter of this name, in words; empty where all do."""
+        declared = {p for choice in cls.choices() for p in choice.parameters if p.name == name}
+        words = {word for p in declared for word in cls._where(p)}
+        told = (" or ".join(word for word in group if word in words) for group in cls.option_groups)
+        return " and ".join(filter(None, told))
 
     @classmethod
     def _where(cls, parameter: Parameter) -> list[str]:

@@ -166,7 +166,7 @@ class Form:
     def sample(self, values: Values, wo: Directions, u: Directions) -> Directions:
         """Directions wi (..., 3) for u (..., 3) uniform in [0, 1): u[0] picks the term, the rest is its own."""
         normal = wo.new_tensor([0.0, 0.0, 1.0])
-        wo, u = torch.broadcast_tensors(torch.where(wo[..., 2:] > 0, wo, normal), u)
+        wo, u = torch.broadcast_tensors(torch.where(wo[..., 2:] <= 0, normal, wo), u)  # a NaN goes on
         drawn = [term.model.sample(self.of_term(term, values), wo, u[..., 1:]) for term in self.terms]
         if len(drawn) == 1:
             return drawn[0]

@@ -17,8 +17,8 @@ than once is missing. `compensated`, it is at most 1.00002 ks, and where F = 1 i
 (tests/models/test_compensation.py).
 Source: Trowbridge and Reitz 1975; Walter, Marschner, Li and Torrance 2007, eqs. 33, 34; Heitz 2014, eqs. 85, 98, 99;
 sampling of visible normals by spherical caps: Dupuy and Benyoub 2023; compensation: Kulla and Conty 2017.
-Departure: D is evaluated from the unit half vector's components, so it stays exact to the horizon; what is lost is read
-from a table.
+Departure: D is evaluated from the half vector's components without the largest of them, so that it and its derivatives
+stay exact from h = n to wi = -wo; what is lost is read from a table.
 """
 
 import math
@@ -37,12 +37,29 @@ class Ggx(SmithLobe):
 
     name = "ggx"
     width = slope_width("width of the distribution of slopes")
-    normal_needs = frozenset({"ux", "uy", "uz"})
+
+    @property
+    def normal_needs(self) -> frozenset[str]:
+        """The quantities of the geometry that the distribution reads."""
+        return frozenset({"ux", "uy", "uz"} if self.anisotropic else {"e2"})
 
     def normals(self, values: Values, g: Geometry) -> Tensor:
-        """1 / (uz^2 + ux^2/ax^2 + uy^2/ay^2)^2 [1] for the unit half vector u, (..., 1)."""
+        """1 / S^2 [1], S = uz^2 + ux^2/ax^2 + uy^2/ay^2 for the unit half vector u, (..., 1).
+
+        The largest component's square is eliminated by |u| = 1. The others' derivatives vanish with them, its own would
+        cancel: where wi + wo is short, u turns by as much as 1 / |wi + wo|, and so would what is left of roundings.
+        """
         ax, ay = self.widths(values)
-        return (g.uz.square() + (g.ux / ax).square() + (g.uy / ay).square()).reciprocal().square()
+        less_x, peak_x = (ax - 1) * (ax + 1) / ax / ax, ax.reciprocal().square()  # 1 - 1/ax^2 and 1/ax^2
+        if not self.anisotropic:
+            height2 = (1 + g.e2).reciprocal()
+            s = torch.where(height2 > 0.5, 1 - less_x * (g.e2 * height2), peak_x + less_x * height2)
+            return s.reciprocal().square()
+        less_y, peak_y = (ay - 1) * (ay + 1) / ay / ay, ay.reciprocal().square()
+        x2, y2, z2 = g.ux.square(), g.uy.square(), g.uz.square()
+        turned = (ax - ay) * (ax + ay) * (peak_x * peak_y)  # 1/ay^2 - 1/ax^2
+        level = torch.where(y2 < x2, peak_x + less_x * z2 + turned * y2, peak_y + less_y * z2 - turned * x2)
+        return torch.where(z2 > 0.5, 1 - less_x * x2 - less_y * y2, level).reciprocal().square()
 
     def fading(self, mu: Tensor, a: Tensor) -> Tensor:
         """(a / (mu + a))^2 [1]: the tail of the distribution."""

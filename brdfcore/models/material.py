@@ -9,7 +9,7 @@ from torch import Tensor, nn
 
 from .._types import Density, Directions, Spectrum
 from ..errors import InvalidValueError, ModelTextError, ParameterError, unknown_name
-from ..geometry import check_directions, geometry
+from ..geometry import check_broadcast, check_directions, geometry
 from .form import Form, build
 from .text import ParsedTerm, Tie, parse
 
@@ -33,7 +33,7 @@ class Material(nn.Module):
                 raise unknown_name("a parameter", key, form.parameters, field=key)
         raw = {term.label: nn.ParameterDict() for term in form.terms}
         for key, parameter in form.parameters.items():
-            value = torch.as_tensor(given.get(key, parameter.default), dtype=torch.float64).detach()
+            value = _number(key, given[key]) if key in given else torch.tensor(parameter.default, dtype=torch.float64)
             parameter.check(key, value)
             label, name = key.split(".")
             raw[label][name] = nn.Parameter(parameter.to_raw(value).clone())
@@ -125,6 +125,7 @@ class Material(nn.Module):
                 f"Expected u to be a tensor of three numbers on the last axis, got {got}. Pass u as (..., 3).",
                 field="u",
             )
+        check_broadcast("wo and u", wo, u, field="u")
         u = u.to(wo).clamp(min=0, max=1 - torch.finfo(wo.dtype).eps / 2)  # rounding to float32 may reach 1
         return self.form.sample(self._values_like(wo), wo, u)
 
@@ -166,6 +167,26 @@ class Material(nn.Module):
             if not all(isinstance(x, int | float) and not isinstance(x, bool) for x in numbers):
                 raise _no_material(f"{key} = {value!r}")
         return cls(form, values)
+
+
+def check_material(material: object) -> None:
+    """Raise InvalidValueError where it is something else, as a text is."""
+    if not isinstance(material, Material):
+        raise InvalidValueError(
+            f"Expected material to be a Material, got {type(material).__name__}. Make one with bc.material(text).",
+            field="material",
+        )
+
+
+def _number(key: str, number: Number) -> Tensor:
+    """A given value in double precision."""
+    try:
+        return torch.as_tensor(number, dtype=torch.float64).detach()
+    except (TypeError, ValueError, RuntimeError):
+        raise ParameterError(
+            f"Expected {key} to be one number or one a channel, got {number!r}. Give {key.split('.')[1]} as such.",
+            field=key,
+        ) from None
 
 
 def _no_material(got: str) -> ModelTextError:

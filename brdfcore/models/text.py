@@ -22,6 +22,7 @@ _TOKEN = re.compile(
     r"\s*(?:(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*)|(?P<mark>[-+(),=\[\].]))"
 )
 _AFTER_VALUE = re.compile(r"\s*-")
+_EXAMPLE = "Write it like 'lambert(kd=0.2) + ward_bounded(isotropic, rs=0.05, a=0.03)'."
 
 
 @dataclass(frozen=True)
@@ -59,11 +60,7 @@ class _Reader:
     def fail(self, expected: str) -> ModelTextError:
         rest = self.text[self.at :].lstrip()
         got = f"{rest.rstrip()[:20]!r} at character {len(self.text) - len(rest) + 1}" if rest else "the end of the text"
-        return ModelTextError(
-            f"Expected {expected} in the model {self.text!r}, got {got}. "
-            "Write it like 'lambert(kd=0.2) + ward_bounded(isotropic, rs=0.05, a=0.03)'.",
-            field="model",
-        )
+        return ModelTextError(f"Expected {expected} in the model {self.text!r}, got {got}. {_EXAMPLE}", field="model")
 
     def take(self, kind: str, value: str | None = None) -> str | None:
         match = _TOKEN.match(self.text, self.at)
@@ -126,6 +123,8 @@ class _Reader:
 
 def parse(text: str) -> list[ParsedTerm]:
     """The terms that the text, or the preset that it names, consists of; raises ModelTextError where it is neither."""
+    if not isinstance(text, str):
+        raise ModelTextError(f"Expected the model to be a text, got {type(text).__name__}. {_EXAMPLE}", field="model")
     reader = _Reader(text)
     terms = [reader.term()]
     while reader.take("mark", "+"):

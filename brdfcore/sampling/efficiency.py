@@ -18,7 +18,7 @@ from torch import Tensor
 from .._types import Density, Directions, Spectrum
 from ..errors import InvalidValueError
 from ..geometry import check_directions
-from ..models.material import Material
+from ..models.material import Material, check_material
 
 COUNT = 65536  # samples for each direction: the mean to about 0.4 % of the weights' deviation
 BLOCK = 2**18  # weights at a time, for the memory
@@ -47,18 +47,22 @@ def efficiency(material: Material, wo: Directions, count: int = COUNT, seed: int
 
     Every wo and every material gets the same `count` triples u, drawn from `seed`: comparisons are not blurred by
     different luck, and a wo's numbers do not depend on what else is asked for. Weights are taken in wo's precision.
-    Raises InvalidValueError for a wo that is not above the horizon, and for a count below 2.
+    Raises InvalidValueError for what is no Material, for a wo that is not finite and above the horizon, and for a count
+    below 2.
     """
+    check_material(material)
     check_directions("wo", wo)
-    low = ~(wo[..., 2] > 0)
-    if bool(low.any()):
+    wrong = ~((wo[..., 2] > 0) & wo.isfinite().all(-1))
+    if bool(wrong.any()):
         raise InvalidValueError(
-            f"Expected wo to be above the horizon, got {wo[low][0].tolist()}. Leave it out: it has no samples.",
+            f"Expected wo to be finite and above the horizon, got {wo[wrong][0].tolist()}. "
+            "Leave it out: it has no samples.",
             field="wo",
         )
-    if count < 2:
+    if isinstance(count, bool) or not isinstance(count, int) or count < 2:
         raise InvalidValueError(
-            f"Expected count to be at least 2, got {count}. A variance needs two samples.", field="count"
+            f"Expected count to be a whole number of at least 2, got {count!r}. A variance needs two samples.",
+            field="count",
         )
     u = torch.rand(count, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(seed)).to(wo.device)
     rows = wo.detach().reshape(-1, 1, 3)

@@ -6,16 +6,19 @@ lock is free. Whoever takes the lock knows that every earlier attempt is void, b
 
 import fcntl
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
+from .records import Attempt
 from .runner import Event, Runner
-from .store import ASK_FOR_LESS, Attempt, JobStore
+from .store import ASK_FOR_LESS, JobStore
 
 _BUSY = 0.05  # how soon a cancelled attempt is noticed [s]
+_SWEEP = 600.0  # how often what is old is looked for [s]
 _IDLE = 0.5  # how soon a job is noticed that another process has submitted [s]
 
 _log = logging.getLogger("service.jobs")
@@ -24,9 +27,22 @@ _log = logging.getLogger("service.jobs")
 class Dispatcher:
     """Claims, renews, collects and retries while it runs; `stop` puts unfinished jobs back into the queue."""
 
-    def __init__(self, store: JobStore, runner: Runner, lock: Path, *, workers: int, fit_seconds: float) -> None:
+    def __init__(
+        self,
+        store: JobStore,
+        runner: Runner,
+        lock: Path,
+        *,
+        workers: int,
+        fit_seconds: float,
+        sweep: Callable[[], None] = lambda: None,
+        ended: Callable[[str, str], None] = lambda job_id, reason: None,
+    ) -> None:
+        """`sweep` is called now and then; `ended` for a job that has succeeded, with the reason "", or failed."""
         self._store, self._runner, self._lock = store, runner, lock
         self._workers, self._fit_seconds = workers, fit_seconds
+        self._sweep, self._ended = sweep, ended
+        self._swept = -math.inf
         self._ends: dict[Attempt, float] = {}  # when the time of each running attempt is up
         self._renewed = 0.0
         self._unsaved: list[Event] = []  # heard, but not yet in the store: it may be out of disk for a while
@@ -70,6 +86,9 @@ class Dispatcher:
             self._save(self._unsaved[0])
             del self._unsaved[0]
         self._supervise()
+        if time.monotonic() - self._swept > _SWEEP:
+            self._swept = time.monotonic()
+            self._sweep()
         ready = self._runner.ready()
         while ready and len(self._ends) < self._workers and (attempt := self._store.claim()):
             self._start(attempt)
@@ -100,21 +119,25 @@ class Dispatcher:
             cancelled = held.get(attempt.id) != attempt.fence
             if cancelled or now > end:
                 self._runner.kill(attempt)
-                if not cancelled:
-                    self._store.fail(attempt, _overdue(self._fit_seconds))
+                if not cancelled and self._store.fail(attempt, _overdue(self._fit_seconds)):
+                    self._ended(attempt.id, "time")
                 del self._ends[attempt]
 
     def _save(self, event: Event) -> None:
         if event.kind == "progress":
             self._store.progress(event.attempt, event.text)
             return
+        job_id = event.attempt.id
         if event.kind == "succeeded":
-            self._store.succeed(event.attempt, event.text)
+            if self._store.succeed(event.attempt, event.text):
+                self._ended(job_id, "")
         elif event.kind == "failed":
-            self._store.fail(event.attempt, event.text)
+            if self._store.fail(event.attempt, event.text):
+                self._ended(job_id, event.reason)
         else:
-            _log.warning("the attempt %d at job %s %s", event.attempt.fence, event.attempt.id, event.text)
-            self._store.retry(event.attempt, event.text)
+            _log.warning("the attempt %d at job %s %s", event.attempt.fence, job_id, event.text)
+            if self._store.retry(event.attempt, event.text) == "failed":
+                self._ended(job_id, "crash")
         self._ends.pop(event.attempt, None)
 
     def _guarded(self, action: Callable[[], None]) -> bool:

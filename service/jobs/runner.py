@@ -15,7 +15,7 @@ from typing import Literal, Protocol
 
 from ..schemas import JobKind
 from . import work
-from .store import Attempt
+from .records import Attempt
 
 Work = Callable[[Connection, str, JobKind, bytes, int], None]
 
@@ -27,6 +27,7 @@ class Event:
     attempt: Attempt
     kind: Literal["progress", "succeeded", "failed", "died"]
     text: str
+    reason: str = ""  # of a failure, in one word: data, memory or internal
 
 
 class Runner(Protocol):
@@ -107,11 +108,11 @@ class LocalRunner:
     def _heard(self, attempt: Attempt) -> Event:
         process, pipe = self._running[attempt]
         try:
-            kind, text = pipe.recv()
+            kind, text, *reason = pipe.recv()
         except (EOFError, OSError):  # the process is gone, perhaps in the middle of a word
             process.join(5.0)
             return Event(attempt, "died", f"ended its process with exit code {process.exitcode}")
-        return Event(attempt, kind, text)
+        return Event(attempt, kind, text, *reason)
 
 
 _main_lock = threading.Lock()

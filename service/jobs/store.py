@@ -5,77 +5,40 @@ A job is a fit or a table of albedos. It is queued, then running under a lease, 
 Each claim adds 1 to `attempts`, which is also the fencing number: whoever holds an older number, or a job that is no
 longer running, is refused.
 A restart of the server ends an attempt through no fault of the job, so it is counted apart and capped apart.
+Work that has succeeded before, told by the hash of what determines its result, succeeds at once with that result.
 
 Every write is BEGIN IMMEDIATE: a deferred transaction that writes after a read fails at once when another has
 written in between, whatever the timeout.
 """
 
 import contextlib
+import math
 import sqlite3
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..schemas import JobKind, JobStatus
+from .records import (
+    BATCH,
+    COLUMNS,
+    Asked,
+    Attempt,
+    Batch,
+    BrokenPromiseError,
+    Job,
+    Promise,
+    QueueFullError,
+    connect,
+    prepare,
+)
 
 MOST_CRASHES = 3
 MOST_RESTARTS = 20
 ASK_FOR_LESS = "Try fewer samples, fewer axes or a simpler model."
-
-_TABLE = """
-CREATE TABLE IF NOT EXISTS jobs (
-    number    INTEGER PRIMARY KEY AUTOINCREMENT,
-    id        TEXT NOT NULL UNIQUE,
-    kind      TEXT NOT NULL CHECK (kind IN ('fit', 'albedo_table')),
-    status    TEXT NOT NULL DEFAULT 'queued'
-              CHECK (status IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
-    body      BLOB NOT NULL,
-    request   TEXT NOT NULL,
-    progress  TEXT,
-    result    TEXT,
-    error     TEXT,
-    attempts  INTEGER NOT NULL DEFAULT 0,
-    restarts  INTEGER NOT NULL DEFAULT 0,
-    lease_end REAL,
-    created   REAL NOT NULL,
-    started   REAL,
-    finished  REAL
-) STRICT;
-CREATE INDEX IF NOT EXISTS jobs_by_status ON jobs (status, number);
-"""
-_COLUMNS = "number, id, kind, status, request, progress, result, error, attempts, created, started, finished"
-
-
-@dataclass(frozen=True)
-class Job:
-    """A job as it stands; request, progress and result are JSON text, times are seconds since 1970."""
-
-    number: int
-    id: str
-    kind: JobKind
-    status: JobStatus
-    request: str
-    progress: str | None
-    result: str | None
-    error: str | None
-    attempts: int
-    created: float
-    started: float | None
-    finished: float | None
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """A claimed job: its body, and the fencing number that every later word about it must carry."""
-
-    id: str
-    fence: int
-    body: bytes
-    kind: JobKind = "fit"
 
 
 class JobStore:
@@ -85,9 +48,9 @@ class JobStore:
         self.lease = lease
         self._clock = clock
         self._writing, self._reading = threading.Lock(), threading.Lock()
-        self._writer = _connect(path)
-        self._writer.executescript(_TABLE)
-        self._reader = _connect(path)  # reads never wait for a write to reach the disk
+        self._writer = connect(path)
+        prepare(self._writer)
+        self._reader = connect(path)  # reads never wait for a write to reach the disk
         self._reader.execute("PRAGMA query_only = ON")
 
     def close(self) -> None:
@@ -95,35 +58,167 @@ class JobStore:
         self._reader.close()
         self._writer.close()
 
-    def submit(self, request: str, body: bytes, kind: JobKind = "fit") -> Job:
-        """A new queued job; `request` is what to show of it, `body` what to work on."""
-        job_id = uuid.uuid4().hex
+    def submit(
+        self,
+        request: str,
+        body: bytes,
+        kind: JobKind = "fit",
+        *,
+        work: str | None = None,
+        owner: str = "",
+        most: int | None = None,
+        promise: Promise | None = None,
+    ) -> Job:
+        """A new queued job; `request` is what to show of it, `body` what to work on.
+
+        work      hash of all that determines the result: where a job of the same has succeeded, so has this one
+        most      unfinished jobs that the owner may have; QueueFullError beyond
+        promise   where it was kept before, the job of that time; BrokenPromiseError where its content differs
+        """
         with self._write() as db:
+            if promise is not None:
+                known = db.execute(f"SELECT promised, {COLUMNS} FROM jobs WHERE promise = ?", (promise.key,)).fetchall()
+                if known and known[0][0] != promise.content:
+                    raise BrokenPromiseError
+                if known:
+                    return _job(known[0][1:])
+            (job,) = self._added(db, [Asked(request, body, kind, work)], owner, most)
+            if promise is not None:
+                db.execute(
+                    "UPDATE jobs SET promise = ?, promised = ? WHERE id = ?", (promise.key, promise.content, job.id)
+                )
+        return job
+
+    def submit_batch(
+        self, request: str, asked: Sequence[Asked], *, owner: str = "", most: int | None = None, promise: Promise | None
+    ) -> Batch:
+        """New queued jobs that belong together, all or none of them; `most` and `promise` are as in `submit`."""
+        batch_id = uuid.uuid4().hex
+        with self._write() as db:
+            if promise is not None:
+                known = db.execute(
+                    f"SELECT promised, {BATCH} FROM batches WHERE promise = ?", (promise.key,)
+                ).fetchall()
+                if known and known[0][0] != promise.content:
+                    raise BrokenPromiseError
+                if known:
+                    return Batch(*known[0][1:])
+            self._added(db, asked, owner, most, batch_id)
+            kept = (None, None) if promise is None else (promise.key, promise.content)
             rows = db.execute(
-                f"INSERT INTO jobs (id, kind, body, request, created) VALUES (?, ?, ?, ?, ?) RETURNING {_COLUMNS}",
-                (job_id, kind, body, request, self._clock()),
+                "INSERT INTO batches (id, request, created, promise, promised) VALUES (?, ?, ?, ?, ?) "
+                f"RETURNING {BATCH}",
+                (batch_id, request, self._clock(), *kept),
             ).fetchall()
-        return _job(rows[0])
+        return Batch(*rows[0])
+
+    def _added(
+        self, db: sqlite3.Connection, asked: Sequence[Asked], owner: str, most: int | None, batch: str | None = None
+    ) -> list[Job]:
+        """New jobs; those whose work has succeeded before have, too."""
+        unfinished = "SELECT count(*) FROM jobs WHERE owner = ? AND status IN ('queued', 'running')"
+        room = math.inf if most is None else most - db.execute(unfinished, (owner,)).fetchone()[0]
+        now, made = self._clock(), []
+        for one in asked:
+            given: dict[str, object] = {"id": uuid.uuid4().hex, "kind": one.kind, "body": one.body, "created": now}
+            given |= {"request": one.request, "owner": owner, "work": one.work, "batch": batch}
+            earlier = db.execute(
+                "SELECT id, result FROM jobs WHERE work = ? AND kind = ? AND status = 'succeeded' LIMIT 1",
+                (one.work, one.kind),
+            ).fetchall()
+            if earlier:
+                given |= {"status": "succeeded", "reused": earlier[0][0], "result": earlier[0][1]}
+                given |= {"started": now, "finished": now}
+            else:
+                room -= 1
+            if room < 0:
+                raise QueueFullError
+            places = ", ".join("?" * len(given))
+            rows = db.execute(
+                f"INSERT INTO jobs ({', '.join(given)}) VALUES ({places}) RETURNING {COLUMNS}", (*given.values(),)
+            ).fetchall()
+            made.append(_job(rows[0]))
+        return made
+
+    def batch(self, batch_id: str) -> Batch | None:
+        """The batch of that id."""
+        rows = self._read(f"SELECT {BATCH} FROM batches WHERE id = ?", batch_id)
+        return Batch(*rows[0]) if rows else None
+
+    def batches(self, limit: int, before: int | None = None) -> list[Batch]:
+        """Up to `limit` batches with numbers below `before`, newest first."""
+        number = 2**63 - 1 if before is None else before
+        rows = self._read(f"SELECT {BATCH} FROM batches WHERE number < ? ORDER BY number DESC LIMIT ?", number, limit)
+        return [Batch(*row) for row in rows]
+
+    def of_batch(self, batch_id: str) -> list[Job]:
+        """The jobs of a batch, in the order of its request; those that were removed since are missing."""
+        return [
+            _job(row) for row in self._read(f"SELECT {COLUMNS} FROM jobs WHERE batch = ? ORDER BY number", batch_id)
+        ]
+
+    def standing(self, batch_id: str) -> list[tuple[JobStatus, str | None]]:
+        """Status and progress of each job of a batch."""
+        return self._read("SELECT status, progress FROM jobs WHERE batch = ?", batch_id)
+
+    def cancel_batch(self, batch_id: str) -> None:
+        """Cancel what of the batch is queued or running."""
+        with self._write() as db:
+            db.execute(
+                "UPDATE jobs SET status = 'cancelled', finished = ? "
+                "WHERE batch = ? AND status IN ('queued', 'running')",
+                (self._clock(), batch_id),
+            )
+
+    def delete_batch(self, batch_id: str) -> bool:
+        """Whether there was such a batch; now there is none, and none of its jobs."""
+        with self._write() as db:
+            db.execute("DELETE FROM jobs WHERE batch = ?", (batch_id,))
+            return db.execute("DELETE FROM batches WHERE id = ?", (batch_id,)).rowcount == 1
 
     def get(self, job_id: str) -> Job | None:
         """The job of that id."""
-        rows = self._read(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", job_id)
+        rows = self._read(f"SELECT {COLUMNS} FROM jobs WHERE id = ?", job_id)
         return _job(rows[0]) if rows else None
 
-    def newest(self, limit: int, before: int | None = None, kind: JobKind = "fit") -> list[Job]:
-        """Up to `limit` jobs of a kind with numbers below `before`, newest first."""
+    def newest(
+        self, limit: int, before: int | None = None, kind: JobKind = "fit", status: JobStatus | None = None
+    ) -> list[Job]:
+        """Up to `limit` jobs of a kind, and of a status, with numbers below `before`, newest first."""
         rows = self._read(
-            f"SELECT {_COLUMNS} FROM jobs WHERE number < ? AND kind = ? ORDER BY number DESC LIMIT ?",
+            f"SELECT {COLUMNS} FROM jobs WHERE number < ? AND kind = ? AND status = coalesce(?, status) "
+            "ORDER BY number DESC LIMIT ?",
             2**63 - 1 if before is None else before,
             kind,
+            status,
             limit,
         )
         return [_job(row) for row in rows]
+
+    def counts(self) -> list[tuple[str, str, int]]:
+        """How many jobs there are of each kind and status."""
+        return self._read("SELECT kind, status, count(*) FROM jobs GROUP BY kind, status")
+
+    def forget(self, before: float) -> int:
+        """How many jobs had ended before that time [s since 1970]; they are removed."""
+        if not self._read("SELECT 1 FROM jobs WHERE finished < ? LIMIT 1", before):
+            return 0
+        with self._write() as db:
+            count = db.execute("DELETE FROM jobs WHERE finished < ?", (before,)).rowcount
+            db.execute(
+                "DELETE FROM batches WHERE created < ? AND id NOT IN (SELECT batch FROM jobs WHERE batch > '')",
+                (before,),
+            )
+            return count
 
     def body(self, job_id: str) -> bytes | None:
         """What the job works on, as it was submitted."""
         rows = self._read("SELECT body FROM jobs WHERE id = ?", job_id)
         return bytes(rows[0][0]) if rows else None
+
+    def asks_for(self, dataset: str) -> bool:
+        """Whether a job is of that dataset."""
+        return bool(self._read("SELECT 1 FROM jobs WHERE instr(request, ?) LIMIT 1", dataset))
 
     def mentioned(self, kind: JobKind, text: str) -> bool:
         """Whether the result of a job of that kind mentions the text."""
@@ -175,14 +270,16 @@ class JobStore:
         """Whether the attempt still held its job; if so, it has failed for this reason."""
         return self._held("status = 'failed', error = ?, finished = ?", attempt, error, self._clock())
 
-    def retry(self, attempt: Attempt, what: str) -> bool:
-        """Whether the attempt still held its job; if so, it is queued again, or has failed after too many crashes."""
-        return self._held(
+    def retry(self, attempt: Attempt, what: str) -> JobStatus | None:
+        """What became of the job, queued again or failed after too many crashes; None if the attempt had lost it."""
+        held = self._held(
             "status = iif(attempts - restarts >= ?, 'failed', 'queued'), "
             "error = iif(attempts - restarts >= ?, ?, NULL), finished = iif(attempts - restarts >= ?, ?, NULL)",
             attempt,
             *(MOST_CRASHES, MOST_CRASHES, _given_up(what), MOST_CRASHES, self._clock()),
         )
+        job = self.get(attempt.id) if held else None
+        return job.status if job else None
 
     def reclaim(self) -> None:
         """Queue every running job again: for the one process that knows that nobody works on any of them."""
@@ -230,13 +327,6 @@ class JobStore:
     def _read(self, query: str, *values: object) -> list[Any]:
         with self._reading:
             return self._reader.execute(query, values).fetchall()
-
-
-def _connect(path: Path) -> sqlite3.Connection:
-    db = sqlite3.connect(path, timeout=5.0, isolation_level=None, check_same_thread=False)
-    db.execute("PRAGMA journal_mode = WAL")
-    db.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
-    return db
 
 
 def _job(row: Any) -> Job:

@@ -28,28 +28,45 @@ from .store import ASK_FOR_LESS
 
 _PROGRESS_EVERY = 0.1  # [s]; each word of progress becomes a write to the disk
 
+Say = Callable[[tuple[str, ...]], object]  # hears a word
+
 _log = logging.getLogger("service.jobs")
 
 
 def run(out: Connection, data: str, kind: JobKind, body: bytes, memory: int) -> None:
-    """Send ("progress", JSON) any number of times, then ("succeeded", JSON) or ("failed", sentence)."""
+    """Send the words of an attempt, as `answer` gives them, from a process of its own."""
     _settle(memory)
+    answer(out.send, Path(data), kind, body, memory)
+
+
+def answer(say: Say, data: Path, kind: JobKind, body: bytes, memory: int) -> None:
+    """Say ("progress", JSON) any number of times, then ("succeeded", JSON) or ("failed", sentence, reason)."""
     try:
-        out.send(("succeeded", _WORK[kind](out, Path(data), body)))
+        say(("succeeded", _WORK[kind](say, data, body)))
     except BrdfError as error:
-        out.send(("failed", str(error)))
+        say(("failed", str(error), "data"))
     except Exception as error:
         if isinstance(error, MemoryError) or "allocate memory" in str(error):  # torch raises RuntimeError for it
             sentence = f"Expected the job to need less than {memory} bytes, but it asked for more. {ASK_FOR_LESS}"
+            reason = "memory"
         else:
             _log.exception("a job raised")
+            reason = "internal"
             sentence = (
                 f"The job stopped with an internal error, {type(error).__name__}. The server's log has the details."
             )
-        out.send(("failed", sentence))
+        say(("failed", sentence, reason))
 
 
-def _fitted(out: Connection, data: Path, body: bytes) -> str:
+def needed(data: Path, kind: JobKind, body: bytes) -> dict[str, bytes]:
+    """The files that an attempt reads, by their paths under the data folder."""
+    if kind != "fit":
+        return {}
+    name = FitRequest.model_validate_json(body).dataset
+    return {} if name is None else Datasets(data).files(name)
+
+
+def _fitted(say: Say, data: Path, body: bytes) -> str:
     request = FitRequest.model_validate_json(body)
     samples = Datasets(data).samples(request)
     last = -math.inf
@@ -60,13 +77,13 @@ def _fitted(out: Connection, data: Path, body: bytes) -> str:
             return
         last = time.monotonic()
         loss = progress.loss if math.isfinite(progress.loss) else None
-        out.send(("progress", json.dumps({"stage": progress.stage, "fraction": progress.fraction, "loss": loss})))
+        say(("progress", json.dumps({"stage": progress.stage, "fraction": progress.fraction, "loss": loss})))
 
     fitted = fit(samples, **request.arguments(), progress=report)
     return json.dumps(fitted.to_dict(), allow_nan=False)
 
 
-def _tabulated(out: Connection, data: Path, body: bytes) -> str:
+def _tabulated(say: Say, data: Path, body: bytes) -> str:
     """Facts about the table, which itself is in the folder of tables under its hash."""
     last = -math.inf
 
@@ -74,22 +91,27 @@ def _tabulated(out: Connection, data: Path, body: bytes) -> str:
         nonlocal last
         if time.monotonic() - last >= _PROGRESS_EVERY or fraction >= 1:
             last = time.monotonic()
-            out.send(("progress", json.dumps({"stage": "table", "fraction": fraction, "loss": None})))
+            say(("progress", json.dumps({"stage": "table", "fraction": fraction, "loss": None})))
 
     return json.dumps(tables.made(AlbedoRequest.model_validate_json(body), data, report), allow_nan=False)
 
 
-_WORK: dict[JobKind, Callable[[Connection, Path, bytes], str]] = {"fit": _fitted, "albedo_table": _tabulated}
+_WORK: dict[JobKind, Callable[[Say, Path, bytes], str]] = {"fit": _fitted, "albedo_table": _tabulated}
 
 
 def _settle(memory: int) -> None:
     """Make this process a quiet, bounded one that does not outlive the server."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole terminal; the server decides what follows
     os.nice(10)
-    torch.set_num_threads(1)
+    limit(memory)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def limit(memory: int) -> None:
+    """Bound what this process may allocate [bytes]."""
     # not RLIMIT_AS: torch maps more addresses than any sensible bound
     resource.setrlimit(resource.RLIMIT_DATA, (memory, resource.RLIM_INFINITY))
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    torch.set_num_threads(1)
 
 
 def _end_with_parent() -> None:

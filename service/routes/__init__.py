@@ -1,10 +1,12 @@
 """The routes, one file a resource."""
 
-from . import albedo, datasets, evaluate, export, fits, health, models, plots
+from . import albedo, batches, datasets, evaluate, events, export, fits, health, models, plots
 
 ROUTERS = (
     datasets.router,
     fits.router,
+    events.router,
+    batches.router,
     plots.router,
     export.router,
     albedo.router,

@@ -1,18 +1,23 @@
 """What the routes of every kind of job share: finding, waiting, cancelling, removing, and what is shown of a job."""
 
 import asyncio
+import contextlib
+import hashlib
 import json
 import re
 import time
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from typing import Any
 
 from fastapi import Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+import brdfcore as bc
+
 from ..errors import ProblemError
-from ..jobs.store import Job
-from ..schemas import FINISHED, JobKind
+from ..jobs.records import BrokenPromiseError, Job, Promise, QueueFullError
+from ..schemas import FINISHED, JobKind, JobStatus
 from ..state import State, state
 
 _LONGEST_WAIT = 60.0  # [s]
@@ -27,6 +32,63 @@ class Paging(BaseModel):
 
     limit: int = Field(20, ge=1, le=100)
     cursor: int | None = Field(None, ge=1, lt=2**63, description="`next` of the page before")
+    status: JobStatus | None = Field(None, description="only those of this status")
+
+
+def submitted(request: Request, kind: JobKind, shown: str, body: bytes, **identity: object) -> Job:
+    """The new job; the same as before where its Idempotency-Key was seen, with an earlier result where its work was.
+
+    shown is the JSON of its request, which with the identity determines the result. Raises as `refusals` does.
+    """
+    work = work_of(kind, shown, **identity)
+    with refusals(request) as (owner, most, promise):
+        return state(request).store.submit(
+            shown, body, kind, work=work, owner=owner, most=most, promise=promise(kind, body)
+        )
+
+
+def work_of(kind: JobKind, shown: str, **identity: object) -> str:
+    """The hash of all that determines a job's result."""
+    work = {"version": bc.__version__, "kind": kind, "request": json.loads(shown), **identity}
+    return _digest(json.dumps(work))
+
+
+@contextlib.contextmanager
+def refusals(request: Request) -> Iterator[tuple[str, int, Callable[[str, bytes], Promise | None]]]:
+    """The owner of what is submitted, the most unfinished jobs of that owner, and what makes the request's promise.
+
+    409 where the Idempotency-Key came with another body, 429 where the owner's queue is full, 422 for what is no key.
+    """
+    owner, most = request.state.owner or "", state(request).settings.queue_limit
+    key = request.headers.get("idempotency-key")
+    if key is not None and not (0 < len(key) <= 255 and key.isascii() and key.isprintable()):
+        raise ProblemError(
+            422,
+            "Expected Idempotency-Key to be 1 to 255 printable characters. Use a new UUID for each submission.",
+            field="Idempotency-Key",
+        )
+    try:
+        yield (
+            owner,
+            most,
+            lambda kind, body: None if key is None else Promise(_digest(f"{owner} {kind} {key}"), _digest(body)),
+        )
+    except BrokenPromiseError:
+        raise ProblemError(
+            409,
+            f"Expected the body that came first with the Idempotency-Key {key!r}, got another. Use a new key.",
+            field="Idempotency-Key",
+        ) from None
+    except QueueFullError:
+        raise ProblemError(
+            429,
+            f"Expected at most {most} unfinished jobs at a time, got more. Wait for some of them to end.",
+            headers={"retry-after": "10"},
+        ) from None
+
+
+def _digest(content: str | bytes) -> str:
+    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
 async def accepted(request: Request, response: Response, job: Job) -> Job:
@@ -47,7 +109,7 @@ async def accepted(request: Request, response: Response, job: Job) -> Job:
 
 def page_of(service: State, kind: JobKind, paging: Paging) -> tuple[list[Job], str | None]:
     """The jobs of a page, newest first, and the cursor of the next one."""
-    jobs = service.store.newest(paging.limit + 1, paging.cursor, kind)
+    jobs = service.store.newest(paging.limit + 1, paging.cursor, kind, paging.status)
     shown = jobs[: paging.limit]
     return shown, str(shown[-1].number) if len(jobs) > len(shown) else None
 
@@ -96,10 +158,11 @@ def summary(job: Job) -> dict[str, Any]:
         "progress": json.loads(job.progress) if job.progress else None,
         "request": json.loads(job.request),
         "error": job.error,
+        "reused": job.reused,
         "attempts": job.attempts,
-        "created": _time(job.created),
-        "started": _time(job.started),
-        "finished": _time(job.finished),
+        "created": time_of(job.created),
+        "started": None if job.started is None else time_of(job.started),
+        "finished": None if job.finished is None else time_of(job.finished),
     }
 
 
@@ -129,5 +192,6 @@ async def _finished(request: Request, job: Job, seconds: float) -> Job:
     return job
 
 
-def _time(seconds: float | None) -> datetime | None:
-    return None if seconds is None else datetime.fromtimestamp(seconds, UTC)
+def time_of(seconds: float) -> datetime:
+    """The time of so many seconds since 1970."""
+    return datetime.fromtimestamp(seconds, UTC)

@@ -13,7 +13,7 @@ from brdfcore.energy._described import described
 
 from .. import tables
 from ..errors import ProblemError, inlined, responses
-from ..jobs.store import Job
+from ..jobs.records import Job
 from ..materials import material_of
 from ..schemas import AlbedoRequest, AlbedoView, TablePage, TableSummary, TableView
 from ..state import State, state
@@ -39,7 +39,7 @@ _FILE = {kind: {"schema": {"format": "binary"}} for kind in _NPZ} | {"applicatio
     responses={
         200: {"model": AlbedoView | TableView, "description": "the values, or a finished table"},
         202: {"model": TableView, "description": "a table, accepted"},
-        **responses(406, 408, 413, 415, 422),
+        **responses(406, 408, 409, 413, 415, 422, 429),
     },
     openapi_extra={"requestBody": _BODY},
 )
@@ -56,7 +56,7 @@ async def albedo(request: Request) -> Response:
         answer = await loop.run_in_executor(service.computing, _values, asked)
         return Response(answer, media_type="application/json")
     response = Response(media_type="application/json")
-    job = await asyncio.to_thread(_submitted, service, asked, content)
+    job = await asyncio.to_thread(_submitted, request, asked, content)
     job = await _jobs.accepted(request, response, job)
     response.body = TableView(**_jobs.view(job)).model_dump_json().encode()
     response.headers["content-length"] = str(len(response.body))
@@ -118,9 +118,9 @@ def _forget(service: State, name: str) -> None:
         tables.remove(service.settings.data, name)
 
 
-def _submitted(service: State, asked: AlbedoRequest, content: bytes) -> Job:
+def _submitted(request: Request, asked: AlbedoRequest, content: bytes) -> Job:
     """The new job, once all of its request that can be checked before the work has been checked."""
-    return service.store.submit(json.dumps(tables.checked(asked)), content, "albedo_table")
+    return _jobs.submitted(request, "albedo_table", json.dumps(tables.checked(asked)), content)
 
 
 def _values(asked: AlbedoRequest) -> str:

@@ -9,9 +9,9 @@ from brdfcore.fitting import check
 
 from ..datasets import inline_samples, missing
 from ..errors import ProblemError, inlined, responses
-from ..jobs.store import Job
+from ..jobs.records import Job
 from ..schemas import FitPage, FitRequest, FitSummary, FitView, RequestView, SamplesView
-from ..state import State, state
+from ..state import state
 from . import _jobs
 from ._http import json_accepted, json_content, parsed
 
@@ -24,13 +24,13 @@ _BODY = {"required": True, "content": {"application/json": {"schema": inlined(Fi
 @router.post(
     "",
     status_code=202,
-    responses={200: {"model": FitView, "description": "finished"}, **responses(406, 408, 413, 415, 422)},
+    responses={200: {"model": FitView, "description": "finished"}, **responses(406, 408, 409, 413, 415, 422, 429)},
     openapi_extra={"requestBody": _BODY},
 )
 async def submit(request: Request, response: Response) -> FitView:
     """Accept a fit; with `Prefer: wait=N` answer with the finished fit if that takes at most N s (60 at most)."""
     body = await json_content(request, _JSON_LIMIT)
-    job = await asyncio.to_thread(_accepted, state(request), body)
+    job = await asyncio.to_thread(_accepted, request, body)
     return FitView(**_jobs.view(await _jobs.accepted(request, response, job)))
 
 
@@ -59,12 +59,12 @@ async def remove(request: Request, fit_id: str) -> None:
     await _jobs.removed(state(request), "fit", fit_id)
 
 
-def _accepted(service: State, body: bytes) -> Job:
+def _accepted(request: Request, body: bytes) -> Job:
     """The new job, once all of its request that can be checked before the fit has been checked."""
-    request = parsed(FitRequest, body)
+    service, asked = state(request), parsed(FitRequest, body)
     summary = None
-    if request.samples is not None:
-        count = len(request.samples.values)
+    if asked.samples is not None:
+        count = len(asked.samples.values)
         if count > service.settings.inline_rows:
             raise ProblemError(
                 413,
@@ -72,14 +72,14 @@ def _accepted(service: State, body: bytes) -> Job:
                 "Upload them as a file with POST /v1/datasets.",
                 field="samples",
             )
-        samples = inline_samples(request.samples)
+        samples = inline_samples(asked.samples)
         summary, channels = SamplesView(count=count, hash=samples.hash), len(samples.channels)
         azimuth_observed = samples.azimuth_observed
     else:
-        dataset = service.datasets.get(request.dataset or "")
+        dataset = service.datasets.get(asked.dataset or "")
         if dataset is None:
-            raise missing(request.dataset or "")
+            raise missing(asked.dataset or "")
         channels, azimuth_observed = len(dataset.report["channels"]), dataset.report["azimuth_observed"]
-    check(channels, **request.arguments(), azimuth_observed=azimuth_observed)
-    shown = RequestView(**request.model_dump(exclude={"samples"}), samples=summary)
-    return service.store.submit(shown.model_dump_json(), body)
+    check(channels, **asked.arguments(), azimuth_observed=azimuth_observed)
+    shown = RequestView(**asked.model_dump(exclude={"samples"}), samples=summary).model_dump_json()
+    return _jobs.submitted(request, "fit", shown, body, azimuth_observed=azimuth_observed)

@@ -1,6 +1,7 @@
 """Signs of life, and the way in."""
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import PlainTextResponse
 
 from ..errors import ProblemError, responses
 from ..schemas import HealthView
@@ -23,6 +24,12 @@ async def readyz(request: Request) -> HealthView:
     if not service.dispatcher.alive:
         raise ProblemError(503, "Expected the dispatcher of fits to run, but it has ended. Restart the service.")
     return HealthView(status="ready")
+
+
+@router.get("/metrics", response_class=PlainTextResponse)
+async def metrics(request: Request) -> Response:
+    """Counts in Prometheus's text format: requests, jobs by status, the queue's depth, fit times, failures."""
+    return Response(request.app.state.metrics.text(), media_type="text/plain; version=0.0.4; charset=utf-8")
 
 
 @router.get("/")

@@ -1,7 +1,7 @@
 """What each effect costs: the time of f with it, and of f and its derivatives, over the time without it.
 
 20,000 pairs of directions, float64, one thread. An effect's absence costs nothing, so no ratio may be below 1 by more
-than the noise of a median. That no operation is left of it: tests/models/test_effects_cost_nothing.py.
+than noise. That no operation is left of it: tests/models/test_effects_cost_nothing.py.
 """
 
 from collections.abc import Callable

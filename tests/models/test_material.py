@@ -246,6 +246,15 @@ def test_a_table_of_values_is_refused():
         bc.Material(bc.material("lambert").form, {"lambert.kd": [[0.1, 0.2]]})
 
 
+@pytest.mark.usefixtures("as_shipped")
+@pytest.mark.parametrize("value", ["a", None, 1j, {}, [0.1, "b"], [[0.1], [0.1, 0.2]]], ids=str)
+def test_what_is_no_number_is_refused(value):
+    expected = f"Expected lambert.kd to be one number or one a channel, got {value!r}. Give kd as such."
+    with pytest.raises(ParameterError, match=f"^{re.escape(expected)}$") as caught:
+        bc.Material(bc.material("lambert").form, {"lambert.kd": value})
+    assert caught.value.field == "lambert.kd"
+
+
 def test_an_empty_list_is_refused():
     with pytest.raises(ParameterError):
         bc.Material(bc.material("lambert").form, {"lambert.kd": []})

@@ -207,6 +207,27 @@ def test_directions_of_a_wrong_shape_are_refused(method, shape):
 
 
 @pytest.mark.usefixtures("as_shipped")
+@pytest.mark.parametrize("method", ["f", "pdf", "weight"])
+def test_directions_that_do_not_broadcast_are_refused(method):
+    expected = (
+        "Expected wi and wo to have shapes that broadcast, got (4, 3) and (2, 5, 3). "
+        "Make their leading axes equal, or of length 1."
+    )
+    with pytest.raises(InvalidValueError, match=f"^{re.escape(expected)}$") as caught:
+        getattr(bc.material("lambert + kurt"), method)(torch.ones(4, 3), torch.ones(2, 5, 3))
+    assert caught.value.field == "wo"
+
+
+@pytest.mark.usefixtures("as_shipped")
+def test_sample_refuses_what_does_not_broadcast():
+    with pytest.raises(
+        InvalidValueError, match=r"^Expected wo and u to have .*, got \(4, 3\) and \(5, 3\)\. "
+    ) as caught:
+        bc.material("lambert + kurt").sample(torch.ones(4, 3), torch.full((5, 3), 0.5))
+    assert caught.value.field == "u"
+
+
+@pytest.mark.usefixtures("as_shipped")
 @pytest.mark.parametrize(
     ("shape", "field"), [((1, 2), "wo"), ((), "wo"), ((1, 2), "u"), ((1, 4), "u"), ((), "u")], ids=str
 )
@@ -426,3 +447,16 @@ def test_a_direction_that_is_no_number_gives_no_number(where, dtype):
     for method in ("f", "pdf", "weight"):
         for arguments in ((bad, good), (good, bad)):
             assert getattr(material, method)(*arguments).isnan().all()
+
+
+@every_dtype
+@pytest.mark.parametrize("where", range(3))
+@pytest.mark.parametrize(
+    "text", ["ward", "kurt(anisotropic)", "blinn_phong", "ggx", "beckmann", "lafortune", "edwards"]
+)
+def test_what_is_sampled_for_no_number_is_no_number(text, where, dtype):
+    wo, u = torch.tensor([0.6, 0.0, 0.8], dtype=dtype), torch.tensor([0.5, 0.3, 0.7], dtype=dtype)
+    material = bc.material(text)
+    assert material.sample(wo, u).isfinite().all()
+    wo[where] = torch.nan
+    assert material.sample(wo, u).isnan().any()

@@ -181,6 +181,30 @@ def test_a_sampler_that_loses_quadrants_is_rejected():
     assert p_value(sample(COUNT["default"], 2), lambda wi: material.pdf(wi, wo), cells) < REJECT
 
 
+@pytest.mark.parametrize("text", ["nu=10, nv=400", "nu=3000, nv=2", "n=50"])
+def test_ashikhmin_and_shirleys_samples_keep_their_strata_in_every_quadrant(text):
+    """Techreport eqs. 21, 22, a quarter of xi_1 for each quadrant, the second and fourth flipped; none overlap."""
+    material = bc.material(f"ashikhmin_shirley({text})")
+    xi_1, xi_2 = (torch.arange(n, dtype=torch.float64).add(0.5) / n for n in (64, 7))
+    u = torch.stack(torch.broadcast_tensors(torch.tensor(0.5), xi_1[:, None], xi_2), -1)
+    h = torch.nn.functional.normalize(material.sample(direction(0, 0), u).detach() + direction(0, 0), dim=-1)
+
+    values = [x.item() for key, x in material.values().items() if key.split(".")[1] in ("n", "nu", "nv")]
+    nu, nv = values[0], values[-1]
+    quadrant = (4 * xi_1).floor()
+    part = 4 * xi_1 - quadrant
+    part = torch.where(quadrant % 2 == 0, part, 1 - part)
+    phi = torch.atan(math.sqrt((nu + 1) / (nv + 1)) * torch.tan(math.pi / 2 * part))
+    phi = torch.where(quadrant % 2 == 0, phi, math.pi - phi) + math.pi * (quadrant // 2)
+    assert bool((phi.diff() > 0).all()), "strata follow each other round the circle"
+    height = (1 - xi_2) ** (1 / (nu * torch.cos(phi) ** 2 + nv * torch.sin(phi) ** 2 + 1))[:, None]
+    below = height <= math.sqrt(0.5)  # wi is below the horizon, and wi + wo another half vector's
+    side = torch.sqrt(1 - height**2)
+    expected = torch.stack([side * torch.cos(phi)[:, None], side * torch.sin(phi)[:, None], height], -1)
+    assert float((h - expected).abs().amax(-1)[~below].max()) <= 1e-13
+    assert int(below.sum()) < below.numel() / 4
+
+
 def test_redrawing_what_falls_below_the_horizon_is_rejected():
     """models.md: "Redrawing it biases the estimator"."""
     material, wo = bc.material("ward(a=0.3)"), direction(80, 0)

@@ -233,10 +233,12 @@ REFUSED = [
     ("ward(constant)", UnknownNameError, "model", "Expected an option of ward to be a known name, got 'constant'."),
     # contradictions and repeats
     ("kurt(isotropic, anisotropic)", ModelTextError, "model", "Expected one of isotropic, anisotropic for kurt, got isotropic and anisotropic. Keep one."),
-    ("kurt(isotropic, mx=0.1)", ModelTextError, "model", "Expected the options and parameters of kurt to agree, got isotropic, mx. Drop one of them: kurt(isotropic, schlick) has ks, f0, m, alpha;"),
-    ("kurt(m=0.1, my=0.2)", ModelTextError, "model", "Expected the options and parameters of kurt to agree, got m, my. Drop one of them: "),
-    ("kurt(constant, f0=0.1)", ModelTextError, "model", "got constant, f0. Drop one of them: kurt(isotropic, constant) has ks, m, alpha; kurt(anisotropic, constant) has ks, mx, my, alpha."),
-    ("ashikhmin_shirley(schlick, ks=0.5)", ModelTextError, "model", "got schlick, ks. Drop one of them: "),
+    ("kurt(isotropic, mx=0.1)", ModelTextError, "model", "Expected the options and parameters of kurt to agree, got isotropic, mx. Drop one of them: mx belongs to anisotropic."),
+    ("kurt(m=0.1, my=0.2)", ModelTextError, "model", "Expected the options and parameters of kurt to agree, got m, my. Drop one of them: m belongs to isotropic; my belongs to anisotropic."),
+    ("kurt(constant, f0=0.1)", ModelTextError, "model", "got constant, f0. Drop one of them: f0 belongs to schlick."),
+    ("ashikhmin_shirley(schlick, ks=0.5)", ModelTextError, "model", "got schlick, ks. Drop one of them: ks belongs to scaled or constant."),
+    ("ggx(ks=0.1, eta=1.5, f0=1)", ModelTextError, "model", "got ks, eta, f0. Drop one of them: eta belongs to dielectric or conductor; f0 belongs to schlick."),
+    ("ggx(compensated, ax=0.1)", ModelTextError, "model", "got compensated, ax. Drop one of them: ax belongs to anisotropic."),
     ("kurt(m=0.1, m=0.2)", ModelTextError, "model", "Expected each argument of kurt once, got m twice. Keep one."),
     ("kurt(isotropic, isotropic)", ModelTextError, "model", "Expected each argument of kurt once, got isotropic twice. Keep one."),
     # ties
@@ -301,6 +303,17 @@ def test_a_wrong_text_is_refused_in_one_sentence(text, kind, field, message):
         bc.material(text)
     assert caught.value.field == field
     assert "\n" not in str(caught.value).replace(repr(text), "")
+
+
+@pytest.mark.usefixtures("as_shipped")
+@pytest.mark.parametrize(
+    "given", [None, 3, b"kurt", bc.MODELS["kurt"], bc.material("kurt")], ids=lambda x: type(x).__name__
+)
+def test_what_is_no_text_is_refused_in_one_sentence(given):
+    expected = f"Expected the model to be a text, got {type(given).__name__}. {HINT}"
+    with pytest.raises(ModelTextError, match=f"^{re.escape(expected)}$") as caught:
+        bc.material(given)
+    assert caught.value.field == "model"
 
 
 def test_the_message_of_a_cycle_does_not_advise_a_self_tie():

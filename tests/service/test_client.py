@@ -17,6 +17,7 @@ from starlette.testclient import TestClient
 
 import brdfcore as bc
 from service import client as module
+from service import client_calls as calls
 from service.client import (
     Client,
     ClientError,
@@ -122,7 +123,7 @@ def test_a_fit_is_exported(client: Client) -> None:
 
 
 def test_many_samples_travel_as_a_file(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "INLINE_ROWS", 10)
+    monkeypatch.setattr(calls, "INLINE_ROWS", 10)
     samples = as_samples()
     fit = client.fit(samples, model="lambert")
     assert fit.view.request.samples is None
@@ -136,7 +137,7 @@ def test_what_samples_say_of_their_azimuth_travels_with_them(client: Client, mon
     samples = as_samples()
     turned = bc.Samples(samples.wi, samples.wo, samples.values, azimuth_observed=True)
     for rows in (100, 10):
-        monkeypatch.setattr(module, "INLINE_ROWS", rows)
+        monkeypatch.setattr(calls, "INLINE_ROWS", rows)
         assert client.fit(turned, model="lambert").result.data["azimuth_observed"] is True
 
 
@@ -213,6 +214,36 @@ def test_cancelling_answers_with_the_cancelled_fit() -> None:
         fit = client.get("f1").cancel()
     assert isinstance(fit, FitResult)
     assert fit.job_status == "cancelled"
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pauses between the tries of a request that take no time."""
+    monkeypatch.setattr(module, "_FIRST", 0.0)
+
+
+def test_a_request_is_sent_again_where_the_service_is_busy_or_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    pauses: list[float] = []
+    monkeypatch.setattr(module.time, "sleep", pauses.append)
+    seen: list[httpx2.Request] = []
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        seen.append(request)
+        if len(seen) == 1:
+            raise httpx2.ReadError("gone")
+        if len(seen) < 4:
+            return httpx2.Response((429, 503)[len(seen) - 2], headers={"retry-after": str(len(seen))})
+        return httpx2.Response(202, json=fit_view("queued"))
+
+    with scripted(answer) as client:
+        client.fit({"values": [1.0], "quantity": "brdf"}, model="lambert", wait=False)
+    assert len({request.headers["idempotency-key"] for request in seen}) == 1
+    assert pauses == [0.0, 2.0, 3.0]
+    seen.clear()
+    problem = {"title": "Too Many Requests", "status": 429, "detail": "Expected fewer."}
+    busy = httpx2.Response(429, json=problem, headers={"content-type": "application/problem+json"})
+    with scripted(lambda request: busy) as client, pytest.raises(ProblemError, match="Expected fewer"):
+        client.models()
 
 
 def test_a_service_that_does_not_answer_is_named() -> None:
@@ -320,3 +351,29 @@ def test_a_table_that_failed_or_is_not_made_is_an_exception() -> None:
         with pytest.raises(WaitError, match="table f1 to finish in the time given"):
             table.wait(timeout=0.01)
         assert table.cancel().job_status == "running"
+
+
+def test_many_fits_at_once_keep_their_order(client: Client) -> None:
+    given = measured_diffuser()
+    double = given | {"values": [[2 * value for value in row] for row in given["values"]]}
+    steep = given | {"theta_i_deg": [89.0] * 24}
+    made = client.fits([given, steep, double], model="lambert", max_theta_deg=80)
+    assert [fit.job_status for fit in made] == ["succeeded", "failed", "succeeded"]
+    assert made[2].parameters["lambert.kd"] == pytest.approx(2 * made[0].parameters["lambert.kd"], rel=1e-9)  # type: ignore[operator]
+
+
+def test_the_newest_fits_are_listed(client: Client) -> None:
+    made = [client.fit(measured_diffuser(), model="lambert", seed=seed).id for seed in range(2)]
+    assert [fit.id for fit in client.recent()] == made[::-1]
+    assert client.recent(1, "succeeded")[0].id == made[1]
+    assert client.recent(status="failed") == []
+
+
+def test_progress_is_told_and_a_result_is_a_material(client: Client) -> None:
+    told: list[float] = []
+    fit = client.fit(as_samples(), model="lambert", progress=lambda now: told.append(now.fraction))
+    assert told[-1] == 1.0
+    assert told == sorted(told)
+    assert fit.progress is not None
+    assert str(fit.material) == fit.result.material_text
+    assert client.fit(as_samples(), model="lambert").reused == fit.id

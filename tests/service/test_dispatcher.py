@@ -15,8 +15,9 @@ import service_attempts as attempts
 from service_cases import measured_diffuser
 
 from service.jobs.dispatcher import Dispatcher
+from service.jobs.records import Attempt, Job
 from service.jobs.runner import Event, LocalRunner, Runner, Work
-from service.jobs.store import Attempt, Job, JobStore
+from service.jobs.store import JobStore
 
 
 @pytest.fixture

@@ -126,3 +126,13 @@ def test_a_body_that_does_not_end_is_refused(monkeypatch: pytest.MonkeyPatch, th
     with pytest.raises(ProblemError, match=r"Send it again\.") as refused:
         asyncio.run(whole())
     assert refused.value.status_code == status
+
+
+def test_what_no_fit_asks_for_is_removed_in_time(http: TestClient, settings: Settings) -> None:
+    dataset = http.post("/v1/datasets", content=csv_file(), params={"quantity": "brdf"}).json()["id"]
+    datasets = Datasets(settings.data)
+    assert datasets.forget(time.time() - 60, lambda name: False) == 0
+    assert datasets.forget(time.time() + 60, lambda name: name == dataset) == 0
+    assert http.get(f"/v1/datasets/{dataset}").status_code == 200
+    assert datasets.forget(time.time() + 60, lambda name: False) == 1
+    assert http.get(f"/v1/datasets/{dataset}").status_code == 404

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from service.jobs.store import MOST_CRASHES, MOST_RESTARTS, Attempt, JobStore
+from brdfcore.errors import InvalidValueError
+from service.jobs.records import Attempt
+from service.jobs.store import MOST_CRASHES, MOST_RESTARTS, JobStore
 
 
 class Clock:
@@ -222,3 +224,26 @@ def test_a_failed_write_leaves_the_store_usable(store: JobStore) -> None:
 def test_writes_are_synced_to_the_disk(store: JobStore) -> None:
     assert store._writer.execute("PRAGMA synchronous").fetchone() == (2,)
     assert store._writer.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+
+
+def test_what_ended_long_ago_is_forgotten(store: JobStore, clock: Clock) -> None:
+    old, new, queued = (store.submit(f'{{"dataset": "{name}"}}', b"").id for name in ("aa", "bb", "cc"))
+    assert store.succeed(claimed(store), "{}")
+    clock.now += 100
+    assert store.fail(claimed(store), "why")
+    assert store.forget(clock.now - 50) == 1
+    assert store.get(old) is None
+    assert store.get(new) is not None
+    assert store.get(queued) is not None
+    assert store.forget(clock.now - 50) == 0
+    assert [store.asks_for(name) for name in ("aa", "bb", "cc")] == [False, True, True]
+
+
+def test_a_store_of_another_version_is_refused(tmp_path: pathlib.Path) -> None:
+    path = tmp_path / "jobs.sqlite3"
+    JobStore(path).close()
+    JobStore(path).close()
+    with sqlite3.connect(path) as db:
+        db.execute("PRAGMA user_version = 1")
+    with pytest.raises(InvalidValueError, match=r"of this version of the service \(\d+\), got version 1\."):
+        JobStore(path)

@@ -1,81 +1,16 @@
 """A real server process: killed, restarted, told to end; accepted fits survive and no process stays behind."""
 
-import contextlib
-import os
 import pathlib
 import signal
 import socket
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from typing import Any
 
 import pytest
 from service_cases import measured_diffuser
+from service_process import SLOW, server, until, until_empty
 
-from service.client import Client, ClientError
 from service.jobs.store import JobStore
-
-SERVE = """
-from service.app import server
-from service.settings import Settings
-server(Settings.from_environment()).run()
-"""
-SLOW = {"model": "lambert + kurt"}  # long enough for a kill to find it running
-
-
-@contextlib.contextmanager
-def server(data: pathlib.Path) -> Iterator[tuple[subprocess.Popen[bytes], Client]]:
-    """A server of that data folder with one worker, in a session of its own, and a client of it."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    environment = os.environ | {"BRDF_DATA": str(data), "BRDF_PORT": str(port), "BRDF_WORKERS": "1"}
-    with (data.parent / "server.log").open("ab") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-c", SERVE], env=environment, start_new_session=True, stdout=log, stderr=log
-        )
-    try:
-        with Client(f"http://127.0.0.1:{port}") as client:
-            end = time.monotonic() + 30
-            while True:
-                assert process.poll() is None, (data.parent / "server.log").read_text()
-                with contextlib.suppress(ClientError):
-                    client.models()
-                    break
-                assert time.monotonic() < end
-                time.sleep(0.05)
-            yield process, client
-    finally:
-        process.kill()
-        process.wait()
-
-
-def session(leader: int) -> list[str]:
-    """The living processes of a session."""
-    found = []
-    for path in pathlib.Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):
-            state, _, _, number = path.read_text().rpartition(")")[2].split()[:4]
-            if int(number) == leader and state != "Z":
-                found.append(path.parent.joinpath("cmdline").read_text())
-    return found
-
-
-def until_empty(leader: int, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    while left := session(leader):
-        assert time.monotonic() < end, left
-        time.sleep(0.01)
-
-
-def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited for too long"
-        time.sleep(0.01)
 
 
 def test_fits_survive_a_killed_server(tmp_path: pathlib.Path) -> None:
@@ -92,11 +27,7 @@ def test_fits_survive_a_killed_server(tmp_path: pathlib.Path) -> None:
         fits = [client.get(fit.id).wait(timeout=60) for fit in (first, second)]
         assert [fit.view.attempts for fit in fits] == [2, 1]
         assert fits[1].status == "converged"
-        assert [fit.id for fit in fits[::-1]] == [item["id"] for item in listed(client)]
-
-
-def listed(client: Client) -> list[dict[str, Any]]:
-    return list(client._send("GET", "/v1/fits").json()["items"])
+        assert [fit.id for fit in fits[::-1]] == [fit.id for fit in client.recent()]
 
 
 def test_sigterm_ends_at_once_and_keeps_the_fits(tmp_path: pathlib.Path) -> None:
@@ -114,7 +45,7 @@ def test_sigterm_ends_at_once_and_keeps_the_fits(tmp_path: pathlib.Path) -> None
 
         waiting = threading.Thread(target=wait)
         waiting.start()
-        until(lambda: [fit["status"] for fit in listed(client)] == ["running"])
+        until(lambda: [fit.status for fit in client.recent()] == ["running"])
         begun = time.monotonic()
         process.send_signal(signal.SIGTERM)
         process.wait(timeout=5)

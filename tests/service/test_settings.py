@@ -30,6 +30,10 @@ def test_arguments_win_over_the_environment_and_none_is_no_argument() -> None:
         ("BRDF_WORKERS", "0", "workers to be above 0, got 0"),
         ("BRDF_FIT_SECONDS", "nan", "fit_seconds to be above 0, got nan"),
         ("BRDF_UPLOAD_LIMIT", "1e9", "upload_limit to be of type int"),
+        ("BRDF_QUEUE_LIMIT", "0", "queue_limit to be above 0"),
+        ("BRDF_KEEP_DAYS", "-1", "keep_days to be 0 or more"),
+        ("BRDF_KEEP_DAYS", "inf", "keep_days to be 0 or more"),
+        ("BRDF_LOG_LEVEL", "loud", "log_level to be one of debug, info, warning, error"),
     ],
 )
 def test_a_bad_value_names_its_variable(name: str, text: str, rule: str) -> None:

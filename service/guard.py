@@ -1,0 +1,118 @@
+"""What stands before every route: a request's id, the key, the size of headers, and what every answer carries."""
+
+import json
+import logging
+import re
+import time
+import uuid
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from . import keys
+from .errors import problem
+from .metrics import Metrics
+from .settings import Settings
+
+OPEN = ("/healthz", "/readyz")  # that answer without a key
+HEADER_LIMIT = 32 * 1024  # bytes of all headers together
+_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
+_CARRIED = {
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-resource-policy": "same-origin",
+    "content-security-policy": "default-src 'none'; frame-ancestors 'none'",
+}
+# FastAPI's own page of documentation loads its scripts from there
+_DOCS = (
+    "default-src 'none'; script-src 'self' 'unsafe-inline' https://cdn.jsdelivr.net; connect-src 'self'; "
+    "style-src 'self' 'unsafe-inline' https://cdn.jsdelivr.net; img-src 'self' data: https://fastapi.tiangolo.com; "
+    "frame-ancestors 'none'"
+)
+
+_log = logging.getLogger("service.requests")
+
+
+class Guard:
+    """ASGI middleware that refuses what must not reach a route, and logs and counts what was answered."""
+
+    def __init__(self, app: ASGIApp, settings: Settings, metrics: Metrics) -> None:
+        self.app, self.settings, self.metrics = app, settings, metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        begun, status = time.perf_counter(), 500
+        headers = Headers(scope=scope)
+        given = headers.get("x-request-id", "")
+        request_id = given if _ID.fullmatch(given) else uuid.uuid4().hex
+        owner = keys.owner_of(headers.get("authorization", ""), self.settings.api_keys)
+        scope.setdefault("state", {}).update(request_id=request_id, owner=owner)
+
+        async def answer(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                carried = MutableHeaders(scope=message)
+                carried["x-request-id"] = request_id
+                for name, value in _CARRIED.items():
+                    carried.setdefault(name, value)
+                if scope["path"].startswith("/docs") and status == 200:
+                    carried["content-security-policy"] = _DOCS
+            await send(message)
+
+        try:
+            app = self._refusal(scope, owner) or self.app
+            await app(scope, receive, answer)
+        finally:
+            seconds = time.perf_counter() - begun
+            route = getattr(scope.get("route"), "path", "none")
+            self.metrics.answered(scope["method"], route, status, seconds)
+            _log.info(
+                "%s %s %d",
+                scope["method"],
+                scope["path"],
+                status,
+                extra={
+                    "fields": {
+                        "request_id": request_id,
+                        "method": scope["method"],
+                        "path": scope["path"],
+                        "status": status,
+                        "milliseconds": round(1000 * seconds, 1),
+                        "key": owner,
+                    }
+                },
+            )
+
+    def _refusal(self, scope: Scope, owner: str | None) -> ASGIApp | None:
+        """The answer to a request that no route is to see."""
+        size = sum(len(name) + len(value) for name, value in scope["headers"])
+        if size > HEADER_LIMIT:
+            return problem(431, f"Expected headers of at most {HEADER_LIMIT} bytes, got {size}. Send less in them.")
+        if self.settings.api_keys and owner is None and scope["path"] not in OPEN:
+            return problem(
+                401,
+                "Expected a known API key. Send it as the header Authorization: Bearer KEY.",
+                headers={"www-authenticate": "Bearer"},
+            )
+        return None
+
+
+class JsonLines(logging.Formatter):
+    """One JSON object a line: time, level, logger, message, and the fields that the record carries."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The line."""
+        said = {
+            "time": self.formatTime(record, "%Y-%m-%dT%H:%M:%S%z"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+            **getattr(record, "fields", {}),
+        }
+        if record.exc_info:
+            said["exception"] = self.formatException(record.exc_info)
+        return json.dumps(said, ensure_ascii=True)
