@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
     from .energy.tables import AlbedoTable, albedo_table
+    from .exports import EXPORTS, Export, export
     from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Rung, Support, fit, fit_batch, supports
     from .fitting.comparison import Comparison, compare
     from .fitting.held_out import HeldOut, held_out
@@ -30,10 +31,12 @@ if TYPE_CHECKING:
     from .models import MODELS, Model
     from .models.material import Material, material
     from .models.presets import PRESETS, Preset
+    from .tabulated import Tabulated, lawrence
 
 __version__ = version("brdfcore")
 
 __all__ = [
+    "EXPORTS",
     "FORMATS",
     "LOSSES",
     "MODELS",
@@ -45,6 +48,7 @@ __all__ = [
     "AlbedoTable",
     "Certificate",
     "Comparison",
+    "Export",
     "Fit",
     "HeldOut",
     "Info",
@@ -56,6 +60,7 @@ __all__ = [
     "Rung",
     "Samples",
     "Support",
+    "Tabulated",
     "__version__",
     "albedo",
     "albedo_table",
@@ -64,12 +69,14 @@ __all__ = [
     "compare",
     "energy",
     "errors",
+    "export",
     "fit",
     "fit_batch",
     "hard_cases",
     "held_out",
     "hemispherical_albedo",
     "info",
+    "lawrence",
     "material",
     "next_directions",
     "plots",
@@ -99,12 +106,14 @@ _MODULES = {
     ".fitting.comparison": ("Comparison", "compare"),
     ".fitting.held_out": ("HeldOut", "held_out"),
     ".fitting.next_directions": ("NextDirections", "next_directions"),
+    ".exports": ("EXPORTS", "Export", "export"),
     ".formats": ("FORMATS", "read"),
     ".formats.info": ("Info", "info"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),
     ".models.material": ("Material", "material"),
     ".models.presets": ("PRESETS", "Preset"),
+    ".tabulated": ("Tabulated", "lawrence"),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 

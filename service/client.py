@@ -36,6 +36,7 @@ from .client_results import (
     AsyncFitResult,
     AsyncTableResult,
     BatchResult,
+    ExportedFile,
     FitResult,
     TableResult,
 )
@@ -64,6 +65,7 @@ __all__ = [
     "BatchResult",
     "Client",
     "ClientError",
+    "ExportedFile",
     "FitFailedError",
     "FitOptions",
     "FitResult",

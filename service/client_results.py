@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 from . import client_calls as calls
@@ -25,6 +26,16 @@ from .schemas import (
 
 if TYPE_CHECKING:
     from brdfcore.models.material import Material
+
+
+@dataclass(frozen=True)
+class ExportedFile:
+    """A fitted material as another program's file, what it holds, and how far from the material that is."""
+
+    content: bytes
+    difference: float  # relative RMS difference of f cos theta_i [1]
+    holds: str
+
 
 View = TypeVar("View", bound=JobView)
 Run = Callable[[Call[Any]], Any]  # takes the steps of a call and gives its result
@@ -139,6 +150,11 @@ class _Fit(_Job[FitView]):
     def _drawn(self, name: str, kind: str, **asked: Any) -> Call[bytes]:
         given = {key: value for key, value in asked.items() if value is not None}
         return (yield from calls.content("GET", f"{self._path}/{self.id}/plots/{name}.{kind}", params=given))
+
+    def _exported(self, name: str) -> Call[ExportedFile]:
+        answer = yield from calls.answered("GET", f"{self._path}/{self.id}/export/{name}")
+        difference = float(answer.headers["x-brdf-difference"])
+        return ExportedFile(bytes(answer.content), difference, answer.headers["x-brdf-holds"])
 
 
 class _Table(_Job[TableView]):
@@ -272,6 +288,11 @@ class FitResult(_Fit, _Waiting[FitView]):
         image: bytes = self._run(self._drawn(name, kind, scale=scale, theta_i_deg=theta_i_deg, channel=channel))
         return image
 
+    def export(self, format: str) -> ExportedFile:  # noqa: A002 - the name that the library and the service use
+        """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json."""
+        file: ExportedFile = self._run(self._exported(format))
+        return file
+
 
 class AsyncFitResult(_Fit, _Awaited[FitView]):
     """The same, to be awaited."""
@@ -289,6 +310,11 @@ class AsyncFitResult(_Fit, _Awaited[FitView]):
         drawn = self._drawn(name, kind, scale=scale, theta_i_deg=theta_i_deg, channel=channel)
         image: bytes = await self._run(drawn)
         return image
+
+    async def export(self, format: str) -> ExportedFile:  # noqa: A002 - the name that the library and the service use
+        """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json."""
+        file: ExportedFile = await self._run(self._exported(format))
+        return file
 
 
 class BatchResult(_Batch):

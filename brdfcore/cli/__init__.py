@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from . import albedo, check, compare, convert, demo, fit, info, models, serve, study
+from . import albedo, check, compare, convert, demo, export, fit, info, models, serve, study
 
 app = typer.Typer(
     name="brdf",
@@ -20,6 +20,7 @@ app.command("convert")(convert.command)
 app.command("models")(models.command)
 app.command("albedo")(albedo.command)
 app.command("check")(check.command)
+app.command("export")(export.command)
 app.command("study")(study.command)
 app.command("serve")(serve.command)
 app.command("demo")(demo.command)

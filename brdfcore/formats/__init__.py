@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import FormatError, unknown_name
-from . import alta, arrow, astm, cornell, curet, delimited, merl, nist, npy, npz, parquet
+from . import alta, arrow, astm, cornell, curet, delimited, merl, nist, npy, npz, parquet, rgl
 from ._format import Format
 from ._text import number
 from .delimited import write_csv
@@ -20,7 +20,7 @@ __all__ = ["ANGLE_UNITS", "FORMATS", "QUANTITIES", "Format", "Masked", "Samples"
 
 FORMATS: Final[dict[str, Format]] = {
     module.FORMAT.name: module.FORMAT
-    for module in (delimited, cornell, merl, npz, npy, parquet, arrow, alta, astm, nist, curet)
+    for module in (delimited, cornell, merl, npz, npy, parquet, arrow, alta, astm, nist, curet, rgl)
 }
 
 HEAD = 64 * 1024  # bytes by which a file's format is told; a longer preamble needs format=

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rgl_file import rgl_bytes
 
 from brdfcore.formats import curet, merl
 
@@ -198,4 +199,5 @@ def examples_of(folder: Path) -> dict[str, bytes]:
         "astm": astm_bytes(),
         "nist": nist_bytes(),
         "curet": values,
+        "rgl": rgl_bytes(),
     }

@@ -24,7 +24,7 @@ def run(count: int, names: list[str], folder: Path) -> dict[str, dict[str, objec
         text=True,
         timeout=900,
         check=False,
-        env={**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(root), str(root / "tests")]), "OMP_NUM_THREADS": "1"},
     )
     assert done.returncode == 0, f"it ended with {done.returncode}: {done.stderr[-2000:]}"
     return json.loads(done.stdout)

@@ -116,6 +116,13 @@ def test_the_report_and_the_plots_are_for_people(client: Client) -> None:
     assert repr(fit) == f"FitResult({fit.id}, 'lambert', succeeded)"
 
 
+def test_a_fit_is_exported(client: Client) -> None:
+    fit = client.fit(as_samples(), model="lambert")
+    made = fit.export("radiance")
+    assert b"void WGMDfunc brdf" in made.content
+    assert (made.difference, made.holds) == (0.0, "Radiance material WGMDfunc.")
+
+
 def test_many_samples_travel_as_a_file(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calls, "INLINE_ROWS", 10)
     samples = as_samples()

@@ -414,6 +414,7 @@ def test_openapi_has_every_route_and_its_errors(http: TestClient) -> None:
         "/v1/fits/{fit_id}": ["delete", "get"],
         "/v1/fits/{fit_id}/cancel": ["post"],
         "/v1/fits/{fit_id}/events": ["get"],
+        "/v1/fits/{fit_id}/export/{format}": ["get"],
         "/v1/fits/{fit_id}/plots/albedo.png": ["get"],
         "/v1/fits/{fit_id}/plots/albedo.svg": ["get"],
         "/v1/fits/{fit_id}/plots/lobes.png": ["get"],
