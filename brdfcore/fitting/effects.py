@@ -8,6 +8,9 @@ That is why the lobe is one that has a Fresnel factor to switch on: beside `ward
 model, whose gain could be that of another shadowing. `kurt`'s alpha and f0 both act on grazing angles, and take each
 other's place; `ggx` has shadowing without a value to fit, reflects at most what comes in, and has long tails without
 a second lobe.
+
+Once the effects are found, the same ones are tried with lobes of another shape (FAMILIES): Beckmann's, whose tails are
+short, and Ward's with bounded albedo, which has neither shadowing nor Fresnel; one stays if it foretells better.
 """
 
 from collections.abc import Mapping
@@ -17,7 +20,8 @@ from typing import Any
 AUTO = "auto"
 STEPS = ("lobe", "Fresnel", "anisotropy", "second lobe")  # the order in which they are tried
 PARTS = ("diffuse", *STEPS[1:])  # what may turn out not to be called for once the rest is there
-_LOBE = "ggx"
+FAMILIES = ("ggx", "beckmann", "ward_bounded")  # the first is climbed with, the others take its place at the end
+_WITHOUT_FRESNEL = ("ward_bounded",)
 
 
 @dataclass(frozen=True)
@@ -28,11 +32,18 @@ class Effects:
     lobes: int = 0
     fresnel: bool = False
     anisotropic: bool = False
+    family: str = FAMILIES[0]
 
     def text(self) -> str:
         """The material's text, every option named."""
-        words = f"{'an' if self.anisotropic else ''}isotropic, {'schlick' if self.fresnel else 'constant'}"
-        return " + ".join(["lambert"] * self.diffuse + [f"{_LOBE}({words})"] * self.lobes)
+        words = f"{'an' if self.anisotropic else ''}isotropic"
+        if self.family not in _WITHOUT_FRESNEL:
+            words += f", {'schlick' if self.fresnel else 'constant'}"
+        return " + ".join(["lambert"] * self.diffuse + [f"{self.family}({words})"] * self.lobes)
+
+    def of(self, family: str) -> "Effects | None":
+        """The same effects of another family; None where it has not all of them."""
+        return None if self.fresnel and family in _WITHOUT_FRESNEL else replace(self, family=family)
 
     def near(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Values by key of leaner or richer effects, as a start for these: an isotropic lobe is one of equal widths."""
@@ -50,6 +61,8 @@ class Effects:
             "anisotropy": replace(self, anisotropic=True),
             "second lobe": replace(self, lobes=2),
         }[effect]
+        if richer.fresnel and self.family in _WITHOUT_FRESNEL:
+            return None
         return None if richer == self else richer
 
     def minus(self, effect: str) -> "Effects | None":

@@ -22,7 +22,7 @@ from ..models.form import Form
 from ._fit import Progress, Teller, check_samples, fit, planned
 from .asked import check, form_of, own, texts
 from .criterion import Spread, gain, spread
-from .effects import AUTO, PARTS, STEPS, Effects
+from .effects import AUTO, FAMILIES, PARTS, STEPS, Effects
 from .folds import split
 from .held_out import left_out
 from .result import Fit
@@ -149,21 +149,44 @@ def _climbed(ladder: _Ladder) -> tuple[_Tried, str]:
     """The material that the climb ends at, and why it ends."""
     effects = Effects()
     current = ladder.first("diffuse", effects.text())
-    been = {effects}
     observed = ladder.samples.azimuth_observed
-    while True:
-        effects, current = _richer(ladder, effects, current, observed=observed)
-        leaner, current = _leaner(ladder, effects, current)
-        if leaner == effects or leaner in been:
-            break
-        been.add(leaner)
-        effects = leaner
+    effects, current = _settled(ladder, effects, current, observed=observed)
+    other, best = _shaped(ladder, effects, current)
+    if other != effects:
+        effects, current = _settled(ladder, other, best, observed=observed)
     absent = _absent(effects, observed=observed)
     ended = f"The ladder ends at {current.model}: "
     ended += f"the data call for no {_or(absent)}." if absent else "no effect is left to add."
     if effects.lobes and not observed:
         ended += " Anisotropy was not tried, for the sample's azimuth was not observed."
     return current, ended
+
+
+def _settled(ladder: _Ladder, effects: Effects, current: _Tried, *, observed: bool) -> tuple[Effects, _Tried]:
+    """Effects added and left out until nothing changes."""
+    been = {effects}
+    while True:
+        effects, current = _richer(ladder, effects, current, observed=observed)
+        leaner, current = _leaner(ladder, effects, current)
+        if leaner == effects or leaner in been:
+            return leaner, current
+        been.add(leaner)
+        effects = leaner
+
+
+def _shaped(ladder: _Ladder, effects: Effects, current: _Tried) -> tuple[Effects, _Tried]:
+    """The same effects with lobes of the family that foretells best."""
+    for family in FAMILIES if effects.lobes else ():
+        other = effects.of(family)
+        if other is None or other.text() in ladder.known:
+            continue
+        one = ladder.tried(other.text(), {})
+        stays, criterion, sentence = ladder.called_for(one, current)
+        reason = f"With lobes of {family} {sentence}: {_verdict(stays)}."
+        ladder.note(f"{family}'s shape", one, criterion, kept=stays, reason=reason)
+        if stays:
+            effects, current = other, one
+    return effects, current
 
 
 def _absent(effects: Effects, *, observed: bool) -> list[str]:
@@ -186,7 +209,7 @@ def _richer(ladder: _Ladder, effects: Effects, current: _Tried, *, observed: boo
             if stays:
                 effects, current, grown = richer, one, True
     left = _absent(effects, observed=observed)
-    richer = replace(effects, lobes=2, fresnel=True, anisotropic=observed)
+    richer = replace(effects, lobes=2, fresnel="Fresnel" in left or effects.fresnel, anisotropic=observed)
     if effects.lobes and len(left) > 1 and richer.text() not in ladder.known:
         one = ladder.tried(richer.text(), richer.near(current.numbers()))
         stays, criterion, sentence = ladder.called_for(one, current)
