@@ -15,7 +15,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import bounds, energy, errors, hard_cases, plots, sampling, study
+    from . import bounds, energy, errors, hard_cases, plots, render, sampling, study
     from .energy.albedo import Albedo, albedo
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
@@ -60,6 +60,7 @@ __all__ = [
     "material",
     "plots",
     "read",
+    "render",
     "sampling",
     "study",
 ]
@@ -80,7 +81,7 @@ _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    if name in ("bounds", "energy", "errors", "hard_cases", "plots", "sampling", "study"):
+    if name in ("bounds", "energy", "errors", "hard_cases", "plots", "render", "sampling", "study"):
         return importlib.import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
