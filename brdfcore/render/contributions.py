@@ -1,8 +1,9 @@
 """What parts of a material contribute to an image at most: the bounds on which the plan rests.
 
-Under light from everywhere of radiance L, a part reflects at most L times its albedo. Under a light without extent it
-reflects f cos theta_i E, which is evaluated at the points and directions that the camera sees. What a part does
-between objects is bounded by the albedos, as a geometric series (plan.py).
+Of a light with an extent, of radiance L and irradiance E, a part reflects at most L times its albedo, and at most E
+times its largest f cos theta_i. Of a light without extent it reflects f cos theta_i E, which is evaluated at the points
+and directions that the camera sees. What a part does between objects is bounded by the albedos,
+as a geometric series (plan.py).
 """
 
 import math
@@ -13,7 +14,7 @@ import torch
 from torch import Tensor
 
 from ..energy import of_form
-from .lights import AreaLight, DeltaLight, Directional
+from .lights import AreaLight, DeltaLight, Directional, RectangleLight, SphereLight
 from .lights import Point as PointLight
 from .scene import Scene
 from .surfaces import Surface
@@ -62,10 +63,27 @@ def _together(parts: list[Vertices]) -> Seen:
     return Seen(vertices, math.acos(lowest))
 
 
-def even_light(scene: Scene) -> float:
-    """The radiance of all lights with an extent together, the largest over the channels."""
-    zero = torch.zeros((), dtype=torch.float64)
-    return sum(float(light.colour(zero).detach().max()) for light in scene.lights if isinstance(light, AreaLight))
+def lamps(scene: Scene) -> list[tuple[float, float]]:
+    """The radiance of each light with an extent, and its largest irradiance on any object."""
+    zero, found = torch.zeros((), dtype=torch.float64), []
+    for light in scene.lights:
+        if isinstance(light, AreaLight):
+            radiance = float(light.colour(zero).detach().max())
+            found.append((radiance, radiance * min(math.pi, _solid_angle(light, scene))))
+    return found
+
+
+def _solid_angle(light: AreaLight, scene: Scene) -> float:
+    """The largest projected solid angle under which an object sees a light [sr], or more."""
+    if isinstance(light, SphereLight):
+        distance = min(shape.distance(light.center) for shape in scene.objects)
+        return math.pi * light.radius**2 / distance**2 if distance > light.radius else math.inf
+    if isinstance(light, RectangleLight):
+        half = math.hypot(*light.edge_u, *light.edge_v) / 2
+        distance = min(shape.distance(light.center) for shape in scene.objects) - half
+        area = math.hypot(*light.edge_u) * math.hypot(*light.edge_v)
+        return area / distance**2 if distance > 0 else math.inf
+    return math.inf
 
 
 def irradiance(scene: Scene) -> float:
@@ -83,7 +101,13 @@ def irradiance(scene: Scene) -> float:
 
 def largest_albedo(surface: Surface, farthest: float = GRAZING, tolerance: float = 1e-4) -> float:
     """The largest albedo [1] over directions of view up to an angle from the normal, with the error claimed."""
-    return float(_albedos(surface, farthest, tolerance).max())
+    return _largest(_albedos(surface, farthest, tolerance))
+
+
+def _largest(albedos: Tensor) -> float:
+    """The largest of (ANGLES, ...), and what a parabola through three neighbours could hide between them."""
+    bend = albedos.diff(dim=0).diff(dim=0).abs().amax() / 8 if len(albedos) > 2 else 0.0
+    return float(albedos.max() + bend)
 
 
 def _albedos(surface: Surface, farthest: float, tolerance: float) -> Tensor:
@@ -101,7 +125,7 @@ def _albedos(surface: Surface, farthest: float, tolerance: float) -> Tensor:
 def lost_albedo(whole: Surface, less: Surface, farthest: float, tolerance: float) -> float:
     """The largest albedo [1] that a surface loses by what `less` leaves out."""
     rest = _albedos(less, farthest, tolerance)
-    return float((_albedos(whole, farthest, tolerance) - rest).abs().max()) + tolerance
+    return _largest((_albedos(whole, farthest, tolerance) - rest).abs()) + tolerance
 
 
 def lost_highlight(scene: Scene, whole: Surface, less: Surface, where: Vertices, enough: float) -> float:

@@ -84,12 +84,13 @@ def everything(scene: Scene, bounces: int = 8) -> Plan:
 
 
 def _light(scene: Scene, surfaces: list[Surface], lone: bool) -> Lighting:
-    even, irradiance = contributions.even_light(scene), contributions.irradiance(scene)
+    irradiance = contributions.irradiance(scene)
     albedo = 0.0 if lone else max(contributions.largest_albedo(surface) for surface in surfaces)
     peak = max(contributions.diffuse_peak(surface) for surface in surfaces)
     in_mean = irradiance > 0 and math.isinf(peak)
     from_points = albedo * irradiance / math.pi if in_mean else (peak * irradiance if irradiance else 0.0)
-    return Lighting(even, irradiance, albedo, albedo * even + from_points, in_mean)
+    light = Lighting(tuple(contributions.lamps(scene)), irradiance, albedo, from_points, in_mean)
+    return replace(light, direct=from_points + light.reflected(albedo, peak))
 
 
 def _bounces(

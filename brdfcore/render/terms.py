@@ -20,11 +20,31 @@ OPTION_NAMES = {"anisotropic": "anisotropy", "schlick": "fresnel", "scaled": "fr
 class Lighting:
     """What the bounds rest on."""
 
-    even: float  # radiance of the lights with extent
+    lamps: tuple[tuple[float, float], ...]  # radiance and largest irradiance of the lights with extent
     irradiance: float  # of those without
     albedo: float  # the largest of the scene
     direct: float  # D [radiance]
     in_mean: bool  # whether D is a mean only
+
+    @property
+    def even(self) -> float:
+        """The radiance of all lights with an extent together."""
+        return sum(radiance for radiance, _ in self.lamps)
+
+    def reflected(self, albedo: float, peak: float) -> float:
+        """The largest radiance that these lights have from a part of this albedo and this largest f cos theta_i."""
+        return sum(min(radiance * albedo, irradiance * peak) for radiance, irradiance in self.lamps)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """An effect that is on so far, and what it belongs to."""
+
+    effect: Effect
+    number: int  # of the surface
+    label: str  # of the term
+    word: str | None = None  # of the option; None for the term itself
+    mixed: bool = False  # its absence would take from f and add to it, so that only force leaves it out
 
 
 def decide(
@@ -38,64 +58,76 @@ def decide(
 ) -> tuple[list[Effect], list[Surface]]:
     """The terms and their options, each with its bound, and the surfaces without those that are left out."""
     visible = contributions.seen(scene, surface_of, len(surfaces))
-    rows: list[tuple[Effect, int, str, str | None]] = []
+    rows: list[_Row] = []
     for number, surface in enumerate(surfaces):
         owner = _name(scene, surface_of.index(number))
         values = surface.values(torch.zeros((), dtype=torch.float64))
         for term in surface.form.terms:
             own = surface.form.of_term(term, values)
-            alone = replace(surface, dropped=frozenset(t.label for t in surface.form.terms if t is not term))
-            name = f"{owner}: {term.label}"
-            if _is_zero(term.model, own):
-                bound, reason = 0.0, "its reflectance is 0"
-            else:
-                nothing = replace(alone, dropped=frozenset(t.label for t in surface.form.terms))
-                bound = _bound(scene, alone, nothing, visible[number], light, depth, budget)
-                reason = "its largest contribution"
-            rows.append((Effect(name, True, reason, 0.0, bound), number, term.label, None))
+            others = frozenset(t.label for t in surface.form.terms if t is not term)
+            alone, nothing = replace(surface, dropped=others), replace(surface, dropped=others | {term.label})
+            name, bound, reason = f"{owner}: {term.label}", 0.0, "its reflectance is 0"
+            if not _is_zero(term.model, own):
+                bound, reason = _bound(scene, alone, nothing, visible[number], light, depth, budget), "its largest part"
+            rows.append(_Row(Effect(name, True, reason, 0.0, bound), number, term.label))
             for word in replaceable(term.model):
-                simpler = replace(alone, simpler={term.label: frozenset({word})})
-                if bound == 0:
-                    found, why = 0.0, "its term is off"
-                elif word == "anisotropic":
-                    pair = widths(term.model, own)
-                    if pair is None:
-                        continue
-                    equal = bool((pair[0] == pair[1]).all())
-                    found, why = (0.0, "equal widths") if equal else (bound, "unequal widths; at most its term")
+                swapped = _swapped(term.model, own, word)
+                if swapped is None:
+                    continue
+                needless, why = swapped
+                if bound == 0 or needless:
+                    found, mixed = 0.0, False
+                elif mixed := needless is None:
+                    found = bound
                 else:
+                    simpler = replace(alone, simpler={term.label: frozenset({word})})
                     found = _bound(scene, alone, simpler, visible[number], light, depth, budget)
-                    why = "what it adds to its term at most"
-                rows.append((Effect(f"{name} {OPTION_NAMES[word]}", True, why, 0.0, found), number, term.label, word))
+                effect = Effect(f"{name} {OPTION_NAMES[word]}", True, why, 0.0, found)
+                rows.append(_Row(effect, number, term.label, word, mixed))
     return _chosen(rows, surfaces, budget, forced)
 
 
+def _swapped(model: Model, own: Values, word: str) -> tuple[bool | None, str] | None:
+    """Whether an option's word has no effect for these values, None where its absence takes from f and adds to it too.
+
+    The second is the reason; there is no simpler form at all where the whole is None.
+    """
+    if word == "anisotropic":
+        pair = widths(model, own)
+        if pair is None:
+            return None
+        equal = bool((pair[0] == pair[1]).all())
+        return (True, "equal widths") if equal else (None, "unequal widths")
+    if word == "compensated":
+        return False, "what it returns at most"
+    if bool((own["f0"] == 1).all()):
+        return True, "its factor is 1"
+    return (None, "what is returned depends on it") if "compensated" in model.options else (False, "its largest part")
+
+
 def _chosen(
-    rows: list[tuple[Effect, int, str, str | None]],
-    surfaces: list[Surface],
-    budget: float,
-    forced: Mapping[str, bool],
+    rows: list[_Row], surfaces: list[Surface], budget: float, forced: Mapping[str, bool]
 ) -> tuple[list[Effect], list[Surface]]:
     """The rows with their decisions: smallest bound first, while they add up to no more than the budget."""
     made, spent, gone = {}, 0.0, set()
-    for effect, number, label, word in sorted(rows, key=lambda row: (row[0].error, row[3] is not None)):
-        with_its_term = word is not None and (number, label) in gone
+    for row in sorted(rows, key=lambda row: (row.effect.error, row.word is not None)):
+        effect, term, surface = row.effect, (row.number, row.label), surfaces[row.number]
+        with_its_term = row.word is not None and term in gone
         bound = 0.0 if with_its_term else effect.error
-        never = word == "anisotropic" and bound > 0 and effect.name not in forced  # two widths have no mean to keep
-        off = not forced.get(effect.name, not (spent + bound <= budget and not never))
+        fits = spent + bound <= budget and not (row.mixed and not with_its_term)
+        off = not forced.get(effect.name, not fits)
         if off:
             spent += bound if effect.name not in forced else 0.0
-            if word is None:
-                gone.add((number, label))
-            surface = surfaces[number]
-            if word is None:
-                surfaces[number] = replace(surface, dropped=surface.dropped | {label})
+            if row.word is None:
+                gone.add(term)
+                surface = replace(surface, dropped=surface.dropped | {row.label})
             else:
-                words = surface.simpler.get(label, frozenset()) | {word}
-                surfaces[number] = replace(surface, simpler={**surface.simpler, label: words})
+                words = surface.simpler.get(row.label, frozenset()) | {row.word}
+                surface = replace(surface, simpler={**surface.simpler, row.label: words})
+            surfaces[row.number] = surface
         reason = "its term is off" if with_its_term else effect.reason
         made[effect.name] = replace(effect, on=not off, reason=reason, error=bound, forced=effect.name in forced)
-    return [made[row[0].name] for row in rows], surfaces
+    return [made[row.effect.name] for row in rows], surfaces
 
 
 def _bound(
@@ -109,16 +141,16 @@ def _bound(
 ) -> float:
     """What the image loses at most where `less` takes the place of `whole` [radiance]."""
     bound = contributions.lost_highlight(scene, whole, less, visible.vertices, budget)
+    peak = contributions.diffuse_peak(whole)
     if light.even:
         tolerance = min(max(1e-2 * budget / light.even, 1e-9), 1e-3)
-        bound += light.even * contributions.lost_albedo(whole, less, visible.farthest, tolerance)
+        bound += light.reflected(contributions.lost_albedo(whole, less, visible.farthest, tolerance), peak)
     if depth and bound <= budget:
         lost = contributions.lost_albedo(whole, less, contributions.GRAZING, 1e-6)
-        peak = contributions.diffuse_peak(whole)
         if light.albedo >= 1 or light.in_mean or (light.irradiance and math.isinf(peak)):
             return math.inf
         indirect = light.direct / (1 - light.albedo)
-        again = lost * light.even + (peak * light.irradiance if light.irradiance else 0.0) + lost * indirect
+        again = light.reflected(lost, peak) + (peak * light.irradiance if light.irradiance else 0.0) + lost * indirect
         bound += lost * indirect + again * light.albedo / (1 - light.albedo)
     return bound
 
