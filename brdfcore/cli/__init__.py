@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from . import albedo, check, demo, fit, models, serve, study
+from . import albedo, check, demo, fit, models, render, serve, study
 
 app = typer.Typer(
     name="brdf",
@@ -17,6 +17,7 @@ app.command("fit")(fit.command)
 app.command("models")(models.command)
 app.command("albedo")(albedo.command)
 app.command("check")(check.command)
+app.command("render")(render.command)
 app.command("study")(study.command)
 app.command("serve")(serve.command)
 app.command("demo")(demo.command)

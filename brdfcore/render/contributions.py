@@ -26,6 +26,7 @@ FIRST = 256  # points at which a part is looked at first: one that shows there i
 FLATTEST = 28 / (23 * math.pi)  # the largest f [1/sr] of a diffuse term of reflectance 1: Ashikhmin and Shirley's
 DIFFUSE = ("lambert", "coupled_lambert", "ashikhmin_shirley_diffuse")
 TILE = 2**16
+ROUGH = 1e-2  # tolerance of albedos where two digits are enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +100,7 @@ def irradiance(scene: Scene) -> float:
     return total
 
 
-def largest_albedo(surface: Surface, farthest: float = GRAZING, tolerance: float = 1e-4) -> float:
+def largest_albedo(surface: Surface, farthest: float = GRAZING, tolerance: float = ROUGH / 10) -> float:
     """The largest albedo [1] over directions of view up to an angle from the normal, with the error claimed."""
     return _largest(_albedos(surface, farthest, tolerance))
 

@@ -1,7 +1,7 @@
 """What a plan says: each effect, on or off, why, what it costs, and what leaving it out changes at most."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .scene import Scene
 from .surfaces import Surface
@@ -66,10 +66,19 @@ class Plan:
         """Term evaluations and ray tests of the image, predicted."""
         return sum(effect.cost for effect in self.effects if effect.on)
 
+    def _told(self) -> list[Effect]:
+        """The rows of the table: interreflections that are on are one."""
+        on = [e for e in self.effects if e.on and e.name.startswith(INTERREFLECTION)]
+        if len(on) < 2:
+            return list(self.effects)
+        name = f"{on[0].name} to {on[-1].name.removeprefix(INTERREFLECTION).strip()}"
+        together = replace(on[0], name=name, cost=sum(effect.cost for effect in on))
+        return [together if effect is on[0] else effect for effect in self.effects if effect not in on[1:]]
+
     def __str__(self) -> str:
         """The table."""
         rows = [("effect", "", "cost", "error without", "reason")]
-        for effect in self.effects:
+        for effect in self._told():
             error = "unbounded" if math.isinf(effect.error) else f"{effect.error:.1e}" if effect.error else "0"
             word = ("on" if effect.on else "off") + (" (forced)" if effect.forced else "")
             rows.append((effect.name, word, f"{effect.cost:.1e}", error, effect.reason))

@@ -157,7 +157,7 @@ def _sampling(scene: Scene, surfaces: list[Surface], lone: bool, forced: Mapping
             sampled_dome or (extended and lobes),
             "even light comes from everywhere"
             if sampled_dome
-            else ("lobes may be narrower than lights" if extended and lobes else "nothing that light sampling misses"),
+            else ("lobes may be narrower than lights" if extended and lobes else "nothing that needs it"),
             0.0,
         ),
         (WEIGHTS, True, "f cos theta_i / pdf; without it, samples count with the reflectance", math.inf),

@@ -143,8 +143,12 @@ def _bound(
     bound = contributions.lost_highlight(scene, whole, less, visible.vertices, budget)
     peak = contributions.diffuse_peak(whole)
     if light.even:
-        tolerance = min(max(1e-2 * budget / light.even, 1e-9), 1e-3)
-        bound += light.reflected(contributions.lost_albedo(whole, less, visible.farthest, tolerance), peak)
+        fine = min(max(1e-2 * budget / light.even, 1e-9), 1e-3)
+        for tolerance in (contributions.ROUGH, fine):  # what is far too much is known soon
+            lost = contributions.lost_albedo(whole, less, visible.farthest, tolerance)
+            if light.reflected(max(lost - 2 * tolerance, 0.0), peak) > budget:
+                break
+        bound += light.reflected(lost, peak)
     if depth and bound <= budget:
         lost = contributions.lost_albedo(whole, less, contributions.GRAZING, 1e-6)
         if light.albedo >= 1 or light.in_mean or (light.irradiance and math.isinf(peak)):
