@@ -194,6 +194,17 @@ def test_simpler_terms_are_the_same_where_what_they_lack_has_no_effect(choice, g
     torch.testing.assert_close(less.reflected(wi, wo), whole.reflected(wi, wo), rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize("text", ["ggx(schlick, f0=0.4)", "ashikhmin_shirley(f0=0.4)", "kurt(schlick, ks=0.7, f0=0.4)"])
+def test_without_fresnel_the_reflectance_is_that_at_normal_incidence(text):
+    """Where the directions meet, Schlick's factor is f0."""
+    material = bc.material(text)
+    label = material.form.terms[0].label
+    less = Surface(material, simpler={label: frozenset({"schlick"})})
+    up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64)
+    torch.testing.assert_close(less.reflected(up, up), Surface(material).reflected(up, up))
+    assert "constant" in less.form.terms[0].model.options
+
+
 def compare(seed: int, tolerance: float = 0.02, bounces: int = 4) -> tuple[float, float, float]:
     """The largest difference to everything beyond the tolerance, in standard errors; the time of both images."""
     scene = random_scene(seed)
