@@ -56,7 +56,7 @@ def test_every_setting_is_listed() -> None:
         assert f"`BRDF_{setting.name.upper()}`" in section("HTTP")
 
 
-@pytest.mark.parametrize("title", ["Python", "Bounds and sampling", "Energy"])
+@pytest.mark.parametrize("title", ["Python", "Bounds and sampling", "Energy", "Scenes"])
 def test_python_examples_print_what_the_readme_shows(
     title: str, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
