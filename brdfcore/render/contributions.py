@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from ..energy import of_form
+from ..energy.probe import symmetry
 from .lights import AreaLight, DeltaLight, Directional, RectangleLight, SphereLight
 from .lights import Point as PointLight
 from .scene import Scene
@@ -112,14 +113,16 @@ def _largest(albedos: Tensor) -> float:
 
 
 def _albedos(surface: Surface, farthest: float, tolerance: float) -> Tensor:
-    """Albedos, (ANGLES, AZIMUTHS, C or 1)."""
+    """Albedos, (ANGLES, AZIMUTHS or 1, C or 1)."""
     if surface.black:
         return torch.zeros(1, 1, 1, dtype=torch.float64)
     t = torch.linspace(0, 1, ANGLES, dtype=torch.float64)
     theta = farthest * (1 - (1 - t).square())  # closer where albedos change more
-    phi = torch.linspace(0, torch.pi / 2, AZIMUTHS, dtype=torch.float64)
     with torch.no_grad():
-        found = of_form(surface.form, surface.values(theta), torch.cos(theta)[:, None], phi, tolerance)
+        values = surface.values(theta)
+        azimuths = 1 if symmetry(surface.form, values).isotropic else AZIMUTHS
+        phi = torch.linspace(0, torch.pi / 2, azimuths, dtype=torch.float64)
+        found = of_form(surface.form, values, torch.cos(theta)[:, None], phi, tolerance)
     return found.values + found.error.nan_to_num(posinf=0.0)
 
 

@@ -117,7 +117,7 @@ def _effects(size: int, samples: int, seed: int, rows: list[tuple[Cell, ...]]) -
     lamp = RectangleLight(center=(2, -3, 5), edge_u=(0, 2, 0), edge_v=(2, 0, 0), radiance=4.0)
     view = Camera(position=(7, 1, 2.5), look_at=(0, 0, 0.9), width=size, height=size)
     scene = Scene(camera=view, objects=objects, lights=(lamp, Dome(radiance=0.3)), samples=samples)
-    whole = plan(scene, 1e-3, bounces=6)
+    whole = plan(scene, 1e-3, bounces=3)
     many = dataclasses.replace(scene, samples=4 * samples)
     reference, _ = _timed(many, whole, seed + 1)
     pixels, full = _timed(scene, whole, seed)
@@ -132,7 +132,7 @@ def _effects(size: int, samples: int, seed: int, rows: list[tuple[Cell, ...]]) -
             "interreflection 2",
         )
         if effect.on and simple:
-            pixels, seconds = _timed(scene, plan(scene, 1e-3, {effect.name: False}, bounces=6), seed)
+            pixels, seconds = _timed(scene, plan(scene, 1e-3, {effect.name: False}, bounces=3), seed)
             error, decibels = _errors(pixels, reference)
             rows.append(("corner", f"without {effect.name}", samples, seconds, error, decibels))
             worth[effect.name] = (1 - seconds / full, error)

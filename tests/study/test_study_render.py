@@ -10,7 +10,7 @@ from brdfcore.study.render import FLOORS, WAYS, _sentence
 
 @pytest.fixture(scope="module")
 def study():
-    return STUDIES["render"](size=6, counts=(16, 128), models=("lambert", "ward_bounded"))
+    return STUDIES["render"](size=5, counts=(8, 64), models=("lambert", "ward_bounded"))
 
 
 def test_noise_falls_with_the_samples(study) -> None:
