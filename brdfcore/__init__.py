@@ -15,7 +15,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import bounds, energy, errors, hard_cases, plots, sampling, study
+    from . import bounds, energy, errors, hard_cases, plots, render, sampling, study
     from .energy.albedo import Albedo, albedo
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
@@ -81,6 +81,7 @@ __all__ = [
     "next_directions",
     "plots",
     "read",
+    "render",
     "sampling",
     "study",
     "supports",
@@ -119,7 +120,7 @@ _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    if name in ("bounds", "energy", "errors", "hard_cases", "plots", "sampling", "study"):
+    if name in ("bounds", "energy", "errors", "hard_cases", "plots", "render", "sampling", "study"):
         return importlib.import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

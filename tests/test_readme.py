@@ -62,7 +62,7 @@ def test_every_setting_is_listed() -> None:
 
 
 @pytest.mark.parametrize(
-    "title", ["Python", "Which model, and where to measure next", "Bounds and sampling", "Energy", "Export"]
+    "title", ["Python", "Which model, and where to measure next", "Bounds and sampling", "Energy", "Export", "Scenes"]
 )
 def test_python_examples_print_what_the_readme_shows(
     title: str, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

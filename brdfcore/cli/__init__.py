@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from . import albedo, check, compare, convert, demo, export, fit, info, models, serve, study
+from . import albedo, check, compare, convert, demo, export, fit, info, models, render, serve, study
 
 app = typer.Typer(
     name="brdf",
@@ -21,6 +21,7 @@ app.command("models")(models.command)
 app.command("albedo")(albedo.command)
 app.command("check")(check.command)
 app.command("export")(export.command)
+app.command("render")(render.command)
 app.command("study")(study.command)
 app.command("serve")(serve.command)
 app.command("demo")(demo.command)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-_NAMES = "albedo, evaluation, fitting, sampling, effects or papers; without a name all but papers."
+_NAMES = "albedo, evaluation, fitting, sampling, effects, render or papers; without a name all but papers."
 
 
 def command(

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from ..errors import InvalidValueError, unknown_name
-from . import albedo, effects, evaluation, fitting, papers, sampling
+from . import albedo, effects, evaluation, fitting, papers, render, sampling
 from ._study import Chart, MakeStudy, Study, machine, versions
 from ._timing import THREADS, one_thread
 
@@ -21,6 +21,7 @@ STUDIES: dict[str, MakeStudy] = {
     "fitting": fitting.fitting,
     "sampling": sampling.sampling,
     "effects": effects.effects,
+    "render": render.render,
     "papers": papers.papers,
 }
 _SEEDS = 2**31  # what every generator here takes, with room to count on from it
