@@ -1,6 +1,6 @@
 """The routes, one file a resource."""
 
-from . import albedo, batches, datasets, evaluate, events, fits, health, models, plots
+from . import albedo, batches, datasets, evaluate, events, fits, health, models, page, plots
 
 ROUTERS = (
     datasets.router,
@@ -12,4 +12,5 @@ ROUTERS = (
     evaluate.router,
     models.router,
     health.router,
+    page.router,
 )
