@@ -19,8 +19,8 @@ export function plane(theta, phi) {
   return { angles, pairs: against(theta, phi, out) };
 }
 
-export const RINGS = 30;
-export const SPOKES = 48;
+export const RINGS = 26;
+export const SPOKES = 40;
 
 /**
  * Viewers over the whole hemisphere on RINGS + 1 rings of SPOKES about the mirror direction, closer together near it;

@@ -36,7 +36,7 @@ function show() {
   const text = (/** @type {any} */ fit) => `${fit.request.model} ${fit.request.loss} ${fit.status} ${fit.id} ${fit.created}`.toLowerCase();
   const found = listed.filter((fit) => text(fit).includes(wanted));
   const rows = found.map((/** @type {any} */ fit) => [
-    new Date(fit.created).toLocaleString(),
+    new Date(fit.created).toLocaleString(undefined, { dateStyle: "short", timeStyle: "short" }),
     made("span", { class: "code" }, fit.request.model),
     fit.request.loss,
     fit.status,

@@ -64,7 +64,9 @@ export async function draw(element, traces, layout) {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 13, family: "system-ui, sans-serif" },
     margin: { l: 54, r: 16, t: 14, b: 46 }, showlegend: false, hovermode: "closest", ...layout,
   };
-  for (const name of ["xaxis", "yaxis"]) if (layout[name]) whole[name] = { ...axis, ...layout[name] };
+  for (const name of ["xaxis", "yaxis"]) {
+    if (layout[name]) whole[name] = { ...axis, ...layout[name], title: { font: { size: 13 }, standoff: 8, ...layout[name].title } };
+  }
   await library.react(element, traces, whole, { displayModeBar: false, responsive: true });
 }
 

@@ -3,7 +3,7 @@
 import { submit } from "./jobs.js";
 import { at, complain, made, shown } from "./dom.js";
 import { THETAS } from "./curves.js";
-import { changed, chosen, materialOf, on, state } from "./state.js";
+import { changed, chosen, ofChannel, on, state, valuesOf } from "./state.js";
 
 const STEPS = 500;
 
@@ -32,8 +32,8 @@ function build() {
  * @param {string} key
  */
 function slider(fit, key) {
-  const value = current(materialOf(fit).values[key]);
-  const { low, high, log } = range(fit, key, current(fit.result.material.values[key]));
+  const value = ofChannel(valuesOf(fit)[key]);
+  const { low, high, log } = range(fit, key, ofChannel(fit.result.material.values[key]));
   const to = (/** @type {number} */ x) => (log ? Math.log(x) : x);
   const from = (/** @type {number} */ x) => (log ? Math.exp(x) : x);
   const number = made("output", {}, shown(value));
@@ -43,17 +43,12 @@ function slider(fit, key) {
     const chosenValue = Number(from(to(low) + ((to(high) - to(low)) * Number(input.value)) / STEPS).toPrecision(6));
     number.textContent = shown(chosenValue);
     input.setAttribute("aria-valuetext", shown(chosenValue));
-    const before = materialOf(fit).values[key];
+    const before = valuesOf(fit)[key];
     const after = Array.isArray(before) ? before.map((one, k) => (k === state.channel ? chosenValue : one)) : chosenValue;
     state.values = { ...state.values, [key]: after };
     changed("values");
   });
   return made("label", { title: fit.result.units[key] ?? key }, made("b", {}, key), number, input);
-}
-
-/** @param {number | number[]} value @returns {number} that of the channel which is looked at */
-function current(value) {
-  return Array.isArray(value) ? value[Math.min(state.channel, value.length - 1)] : value;
 }
 
 /**
@@ -85,7 +80,7 @@ async function fitAgain() {
   if (fit === null) return;
   complain("hand-error", null);
   const { samples, model, ...options } = fit.request;
-  const free = Object.entries(materialOf(fit).values).filter(([key]) => !(key in options.fixed));
+  const free = Object.entries(valuesOf(fit)).filter(([key]) => !(key in options.fixed));
   const given = Object.fromEntries(Object.entries(options).filter(([, value]) => value !== null));
   const named = model === "auto" || model === null ? fit.result.model : model;
   try {
@@ -97,12 +92,12 @@ async function fitAgain() {
 
 /**
  * Say what the values by hand mean.
- * @param {(number | null)[][]} albedos at THETAS, one column a channel
+ * @param {(number | null)[]} albedos at THETAS
  * @param {number} error now [1/sr]
  * @param {number} fitted as it was fitted [1/sr]
  */
 export function tell(albedos, error, fitted) {
-  const rows = albedos.map((row) => Math.max(...row.map((value) => value ?? Infinity)));
+  const rows = albedos.map((value) => value ?? Infinity);
   const largest = Math.max(...rows);
   const where = THETAS[rows.indexOf(largest)];
   const energy = largest <= 1 ? `Conserves energy up to 89°: albedo at most ${shown(largest)}, at ${where}°.` : `Creates energy: albedo ${shown(largest)} at ${where}°.`;

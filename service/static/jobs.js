@@ -96,11 +96,14 @@ function row(fit, signal) {
       if (!(error instanceof Refusal && error.status === 409)) failing(failure, error); // 409: it has just ended
     }
   });
-  tell(fit);
+  tell(fit.result ? { ...fit, progress: { fraction: 1, loss: fit.result.objective } } : fit);
   if (!FINISHED.includes(fit.status)) {
     follow(fit.id, tell, signal)
       .then(() => get(`/v1/fits/${fit.id}`, { signal }))
-      .then((ended) => arrived(ended))
+      .then((ended) => {
+        if (ended.result) tell({ ...ended, progress: { fraction: 1, loss: ended.result.objective } });
+        arrived(ended);
+      })
       .catch((error) => signal.aborted || failing(failure, error));
   }
   return made("div", { class: "job" }, made("span", { class: "code" }, name), bar, said, svg.element, made("span", {}, cancel), failure);

@@ -6,7 +6,7 @@ import { hemisphere, joined, plane } from "./directions.js";
 import { at, complain, made, shown } from "./dom.js";
 import { tell } from "./hand.js";
 import { latest } from "./latest.js";
-import { drawPolar, turnable } from "./polar.js";
+import { drawPolar, measured, turnable } from "./polar.js";
 import { drawSolid, install as turnSolid, paint } from "./solid.js";
 import { changed, chosen, materialOf, on, ranked, state } from "./state.js";
 
@@ -38,12 +38,13 @@ function whole() {
   against();
 }
 
-/** Aim the light at an incidence that was measured, where the present one was not. */
+/** Aim the light where most was measured in its plane, if nothing was where it is. */
 function aim() {
-  const measured = incidences();
-  if (measured.length && !measured.some((theta) => Math.abs(theta - state.theta) < 1)) {
-    state.theta = measured.reduce((a, b) => (Math.abs(b - 50) < Math.abs(a - 50) ? b : a));
-  }
+  const here = (/** @type {number} */ theta) => measured(theta).length;
+  if (state.samples === null || here(state.theta) > 0) return;
+  const angles = Array.from({ length: 18 }, (_, k) => 5 * k);
+  const best = angles.reduce((a, b) => (here(b) > here(a) ? b : a), 45);
+  if (best !== state.theta) state.theta = best;
 }
 
 /** @returns {number[]} the angles of incidence of the samples, each once, at most 40 */
@@ -100,10 +101,9 @@ async function drawLobes(signal) {
     fits.map((one) => evaluated(one, one === fit ? joined(line.pairs, ball.pairs) : line.pairs, `${state.theta} ${state.phi} ${one === fit}`, signal)),
   );
   if (signal.aborted) return;
-  const values = answers.map((rows) => rows.map((row) => row[Math.min(state.channel, row.length - 1)]));
-  const curves = fits.map((one, k) => ({ name: one.result.model, angles: line.angles, f: values[k].slice(0, line.angles.length), chosen: one === fit }));
+  const curves = fits.map((one, k) => ({ name: one.result.model, angles: line.angles, f: answers[k].slice(0, line.angles.length), chosen: one === fit }));
   await drawPolar(curves);
-  drawSolid(ball.vectors, values[fits.indexOf(fit)].slice(line.angles.length));
+  drawSolid(ball.vectors, answers[fits.indexOf(fit)].slice(line.angles.length));
   complain("look-error", null);
 }
 
@@ -113,9 +113,10 @@ async function drawAgainst(signal) {
   if (fit === null) return;
   const fits = ranked();
   const json = (/** @type {import("./state.js").Fit} */ one) => ({ material: materialOf(one), theta_deg: THETAS, phi_deg: state.phi, tolerance: 1e-3 });
-  const albedos = await Promise.all(fits.map((one) => remembered(one, `albedo ${state.phi}`, () => get("/v1/albedo", { method: "POST", json: json(one), signal }))));
+  const integrated = async (/** @type {import("./state.js").Fit} */ one) => (await get("/v1/albedo", { method: "POST", json: json(one), signal })).values.map(([value]) => value);
+  const albedos = await Promise.all(fits.map((one) => remembered(one, `albedo ${state.phi}`, () => integrated(one))));
   if (signal.aborted) return;
-  await drawAlbedo(fits.map((one, k) => ({ name: one.result.model, values: albedos[k].values, chosen: one === fit })));
+  await drawAlbedo(fits.map((one, k) => ({ name: one.result.model, values: albedos[k], chosen: one === fit })));
   const { samples } = state;
   let [error, fitted] = [NaN, NaN];
   if (samples !== null) {
@@ -124,22 +125,27 @@ async function drawAgainst(signal) {
     if (signal.aborted) return;
     await drawResiduals(f);
     error = cosineRms(f);
-    fitted = cosineRms(known.get(`${fit.id} samples`) ?? f);
+    fitted = cosineRms(known.get(nameOf(fit, "samples")) ?? f);
   }
-  tell(albedos[fits.indexOf(fit)].values, error, fitted);
+  tell(albedos[fits.indexOf(fit)], error, fitted);
 }
 
 /**
- * The values of a fit's material, one row a pair of directions.
+ * The values of a fit's material, one a pair of directions.
  * @param {import("./state.js").Fit} fit
  * @param {import("./directions.js").Pairs} pairs
  * @param {string} which names the pairs
  * @param {AbortSignal} signal
- * @returns {Promise<(number | null)[][]>}
+ * @returns {Promise<(number | null)[]>}
  */
 function evaluated(fit, pairs, which, signal) {
   const json = { material: materialOf(fit), ...pairs };
-  return remembered(fit, which, async () => (await get("/v1/evaluate", { method: "POST", json, signal })).f);
+  return remembered(fit, which, async () => (await get("/v1/evaluate", { method: "POST", json, signal })).f.map(([f]) => f));
+}
+
+/** @param {import("./state.js").Fit} fit @param {string} which */
+function nameOf(fit, which) {
+  return `${fit.id} ${state.channel} ${which}`;
 }
 
 /**
@@ -150,7 +156,7 @@ function evaluated(fit, pairs, which, signal) {
  */
 async function remembered(fit, which, answer) {
   if (state.values !== null && fit.id === state.chosen) return answer();
-  const name = `${fit.id} ${which}`;
+  const name = nameOf(fit, which);
   if (!known.has(name)) {
     const found = await answer();
     if (known.size > 400) known.clear();

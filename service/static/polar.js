@@ -6,7 +6,7 @@ import { colours, draw } from "./figures.js";
 import { radius, rings } from "./scale.js";
 import { state } from "./state.js";
 
-const NEAR = 1.5; // a measured point is drawn where its light is so close to the one chosen [degrees]
+const NEAR = 3; // a measured point is drawn where its light is so close to the one chosen [degrees]
 
 /** @typedef {{name: string, angles: number[], f: (number | null)[], chosen: boolean}} Curve */
 
@@ -16,7 +16,7 @@ const NEAR = 1.5; // a measured point is drawn where its light is so close to th
  */
 export async function drawPolar(curves) {
   const { series, soft, line, ink } = colours();
-  const points = measured();
+  const points = measured(state.theta);
   const top = Math.max(...curves.flatMap((curve) => curve.f.map((value) => value ?? 0)), ...points.map((point) => point.value));
   const r = radius(state.scale, top);
   const traces = curves.map(({ name, angles, f, chosen }, k) => ({
@@ -44,15 +44,18 @@ export async function drawPolar(curves) {
     + (points.length ? `: ${points.length} measured` : state.samples ? ": none measured" : "");
 }
 
-/** The samples of the light's direction in its plane; a positive angle is on the mirror's side. */
-function measured() {
+/**
+ * The samples of the light's direction in its plane; a positive angle is on the mirror's side.
+ * @param {number} theta of the light
+ */
+export function measured(theta) {
   const { samples } = state;
   if (samples === null) return [];
   return samples.values.flatMap((row, k) => {
     const value = row[Math.min(state.channel, row.length - 1)];
     const turned = apart(samples.phi_o_deg[k], samples.phi_i_deg[k]);
-    const away = Math.abs(samples.theta_i_deg[k] - state.theta) > NEAR || (samples.theta_o_deg[k] > 1 && turned > 3 && turned < 177);
-    const other = samples.theta_i_deg[k] > 1 && turnable() && apart(samples.phi_i_deg[k], state.phi) > 3;
+    const away = Math.abs(samples.theta_i_deg[k] - theta) > NEAR || (samples.theta_o_deg[k] > 1 && turned > 5 && turned < 175);
+    const other = samples.theta_i_deg[k] > 1 && turnable() && apart(samples.phi_i_deg[k], state.phi) > 5;
     return value === null || away || other ? [] : [{ angle: turned > 90 ? samples.theta_o_deg[k] : -samples.theta_o_deg[k], value }];
   });
 }

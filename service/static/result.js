@@ -3,6 +3,8 @@
 import { at, made, shown, table } from "./dom.js";
 import { choose, chosen, on, ranked, state } from "./state.js";
 
+const FEW = 4; // channels whose values are all shown at once
+
 /** Show results as they come. */
 export function install() {
   on("fits", () => {
@@ -60,7 +62,7 @@ function detail() {
   const { result } = fit;
   const parts = [
     made("h3", {}, "Parameters of ", made("span", { class: "code" }, result.model)),
-    table("Parameters with their intervals", ["Parameter", "Value#", "95 % interval", "What it is"], parameters(result)),
+    ...parameters(result),
   ];
   if (result.undetermined.length > 0)
     parts.push(made("p", { class: "said" }, `The data do not determine ${result.undetermined.join(", ")}: other values fit as well, so take the stated ones as examples.`));
@@ -81,19 +83,35 @@ function reciprocity(certificate) {
   return `${symmetric} The smallest value met is ${shown(certificate.min_value)} 1/sr. The albedo is drawn against the angle below.`;
 }
 
-/** One row a value. @param {any} result @returns {any[][]} */
+/**
+ * One row a value; where the channels are many, only that which is looked at, and all of them folded away.
+ * @param {any} result
+ * @returns {HTMLElement[]}
+ */
 function parameters(result) {
-  return Object.entries(result.parameters).flatMap(([key, value]) => {
-    const several = Array.isArray(value);
-    const values = several ? value : [value];
-    const intervals = several ? (result.intervals[key] ?? values.map(() => null)) : [result.intervals[key]];
-    return values.map((one, k) => [
-      made("span", { class: "code" }, several ? `${key} ${result.channels[k] ?? k}` : key),
-      shown(one),
-      interval(result, key, intervals[k]),
-      k === 0 ? (result.units[key] ?? "") : "",
-    ]);
-  });
+  const listed = (/** @type {any[][]} */ rows) => table("Parameters with their intervals", ["Parameter", "Value#", "95 % interval", "What it is"], rows);
+  const every = result.channels.map((/** @type {string} */ _, /** @type {number} */ k) => k);
+  const few = every.length <= FEW ? every : [state.channel];
+  const entries = Object.entries(result.parameters);
+  const rows = (/** @type {number[]} */ channels) => entries.flatMap(([key, value]) => valuesIn(result, key, value, channels));
+  if (few === every) return [listed(rows(every))];
+  const all = made("details", {}, made("summary", {}, `All ${every.length} channels`));
+  all.addEventListener("toggle", () => all.open && all.childElementCount === 1 && all.append(listed(rows(every))));
+  return [listed(rows(few)), all];
+}
+
+/**
+ * @param {any} result
+ * @param {string} key
+ * @param {any} value a number, or one a channel
+ * @param {number[]} channels
+ */
+function valuesIn(result, key, value, channels) {
+  const what = result.units[key] ?? "";
+  if (!Array.isArray(value)) return [[made("span", { class: "code" }, key), shown(value), interval(result, key, result.intervals[key]), what]];
+  return channels.map((k) => [
+    made("span", { class: "code" }, `${key} (${result.channels[k]})`), shown(value[k]), interval(result, key, result.intervals[key]?.[k]), k === channels[0] ? what : "",
+  ]);
 }
 
 /** @param {any} result @param {string} key @param {number[] | null | undefined} interval */

@@ -7,6 +7,7 @@ import { radius } from "./scale.js";
 import { state } from "./state.js";
 
 const DEGREE = Math.PI / 180;
+const SKIN = [64, 128, 214]; // red, green and blue, readable on light and on dark
 const view = { turn: -60, height: 24 }; // where the eye is [degrees]
 /** @type {{vectors: number[][], f: (number | null)[]}} */
 let mesh = { vectors: [], f: [] };
@@ -67,10 +68,9 @@ export function paint() {
     }
   }
   faces.sort((a, b) => a.depth - b.depth);
-  const [red, green, blue] = channelsOf(colours().series[0]);
   pen.lineWidth = 0.7;
   for (const { corners, shade: lit } of faces) {
-    pen.fillStyle = pen.strokeStyle = `rgb(${[red, green, blue].map((c) => Math.round(c * (0.5 + 0.5 * lit) + 110 * lit ** 3)).join(" ")})`;
+    pen.fillStyle = pen.strokeStyle = `rgb(${SKIN.map((c) => Math.round(c * (0.42 + 0.58 * lit) + 70 * lit ** 4)).join(" ")})`;
     pen.beginPath();
     for (const k of corners) pen.lineTo(placed[k][0], placed[k][1]);
     pen.closePath();
@@ -131,9 +131,4 @@ function ray(pen, place, light) {
 /** @param {number[]} point @returns {[number, number]} */
 function flat([x, y]) {
   return [x, y];
-}
-
-/** @param {string} colour #rrggbb @returns {number[]} */
-function channelsOf(colour) {
-  return [1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16));
 }

@@ -67,8 +67,18 @@ export function choose(id) {
   changed("chosen");
 }
 
-/** @param {Fit} fit @returns {any} the JSON of its material, with the values that were set by hand */
+/** @param {Fit} fit @returns {Record<string, number | number[]>} the values of its material, those set by hand included */
+export function valuesOf(fit) {
+  return { ...fit.result.material.values, ...(fit.id === state.chosen ? state.values : null) };
+}
+
+/** @param {number | number[]} value @returns {number} that of the channel which is looked at */
+export function ofChannel(value) {
+  return Array.isArray(value) ? value[Math.min(state.channel, value.length - 1)] : value;
+}
+
+/** @param {Fit} fit @returns {any} the JSON of its material in the channel which is looked at: one of 31 takes 1/31 of the time */
 export function materialOf(fit) {
-  const material = fit.result.material;
-  return state.values && fit.id === state.chosen ? { ...material, values: { ...material.values, ...state.values } } : material;
+  const values = Object.entries(valuesOf(fit)).map(([key, value]) => [key, ofChannel(value)]);
+  return { ...fit.result.material, values: Object.fromEntries(values) };
 }

@@ -1,6 +1,6 @@
 /** Step 6: what one takes away: the report, the figures, files for other programs, a link, and code that does the same. */
 
-import { ask } from "./api.js";
+import { ask, hasKey } from "./api.js";
 import { at, complain, made, save } from "./dom.js";
 import { svg } from "./figures.js";
 import { chosen, on, state } from "./state.js";
@@ -97,7 +97,7 @@ function told(request) {
 function python(fit) {
   const literal = (/** @type {unknown} */ value) => (value === true ? "True" : JSON.stringify(value));
   const options = Object.entries(told(fit.request)).map(([name, value]) => `, ${name}=${literal(value)}`).join("");
-  const key = sessionStorage.length ? ", api_key=KEY" : "";
+  const key = hasKey() ? ", api_key=KEY" : "";
   return `from service.client import Client
 
 with Client("${location.origin}"${key}) as client:
@@ -107,7 +107,7 @@ with Client("${location.origin}"${key}) as client:
 
 /** @param {import("./state.js").Fit} fit */
 function curl(fit) {
-  const key = sessionStorage.length ? " -H 'Authorization: Bearer KEY'" : "";
+  const key = hasKey() ? " -H 'Authorization: Bearer KEY'" : "";
   const body = JSON.stringify({ dataset: fit.request.dataset ?? "DATASET", model: fit.request.model, ...told(fit.request) }, null, 1).replaceAll("\n", "").replaceAll("{ ", "{");
   return `curl -sS${key} --data-binary @FILE ${location.origin}/v1/datasets
 curl -sS${key} -H 'Prefer: wait=30' -H 'Content-Type: application/json' \\
