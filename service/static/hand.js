@@ -37,7 +37,7 @@ function slider(fit, key) {
   const to = (/** @type {number} */ x) => (log ? Math.log(x) : x);
   const from = (/** @type {number} */ x) => (log ? Math.exp(x) : x);
   const number = made("output", {}, shown(value));
-  const input = made("input", { type: "range", min: 0, max: STEPS, step: 1, name: key, "aria-valuetext": shown(value) });
+  const input = made("input", { type: "range", id: `hand-${key}`, min: 0, max: STEPS, step: 1, name: key, "aria-valuetext": shown(value) });
   input.value = String((STEPS * (to(value) - to(low))) / (to(high) - to(low)));
   input.addEventListener("input", () => {
     const chosenValue = Number(from(to(low) + ((to(high) - to(low)) * Number(input.value)) / STEPS).toPrecision(6));
@@ -48,7 +48,7 @@ function slider(fit, key) {
     state.values = { ...state.values, [key]: after };
     changed("values");
   });
-  return made("label", { title: fit.result.units[key] ?? key }, made("b", {}, key), number, input);
+  return made("label", { for: input.id, title: fit.result.units[key] ?? key }, made("b", {}, key), number, input);
 }
 
 /**

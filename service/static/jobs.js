@@ -16,12 +16,16 @@ let streams = new AbortController();
  * @param {any[]} requests bodies of POST /v1/fits
  */
 export async function submit(requests) {
-  const answers = await Promise.allSettled(requests.map((json) => get("/v1/fits", { method: "POST", json })));
-  const fits = answers.flatMap((answer) => (answer.status === "fulfilled" ? [answer.value] : []));
+  const fits = [];
+  const refused = [];
+  for (const json of requests) { // one by one, so that they are fitted in the order in which they stand
+    try {
+      fits.push(await get("/v1/fits", { method: "POST", json }));
+    } catch (error) {
+      refused.push(`${json.model}: ${error instanceof Error ? error.message : error}`);
+    }
+  }
   if (fits.length > 0) present(fits);
-  const refused = answers.flatMap((answer, k) =>
-    answer.status === "rejected" ? [`${requests[k].model}: ${answer.reason.message}`] : [],
-  );
   if (refused.length > 0) throw new Error(refused.join("\n"));
 }
 

@@ -81,7 +81,7 @@ function slide(name, text, low, high) {
     value.textContent = `${input.value}°`;
     set(name, Number(input.value));
   });
-  return made("label", { class: "slide" }, made("span", {}, `${text}: `, value), input, marks);
+  return made("label", { class: "slide", for: input.id }, made("span", {}, `${text}: `, value), input, marks);
 }
 
 /** @param {"scale" | "theta" | "phi" | "channel"} name @param {any} value */
