@@ -3,7 +3,7 @@
 import { ask, get } from "./api.js";
 import { at, complain, made, table } from "./dom.js";
 import { open } from "./jobs.js";
-import { on, state } from "./state.js";
+import { nameOf, on, state } from "./state.js";
 
 /** @type {import("./state.js").Fit[]} */
 let listed = [];
@@ -33,11 +33,11 @@ async function load(cursor) {
 
 function show() {
   const wanted = at("find-fit").value.trim().toLowerCase();
-  const text = (/** @type {any} */ fit) => `${fit.request.model} ${fit.request.loss} ${fit.status} ${fit.id} ${fit.created}`.toLowerCase();
+  const text = (/** @type {any} */ fit) => `${nameOf(fit)} ${fit.request.loss} ${fit.status} ${fit.id} ${fit.created}`.toLowerCase();
   const found = listed.filter((fit) => text(fit).includes(wanted));
   const rows = found.map((/** @type {any} */ fit) => [
     new Date(fit.created).toLocaleString(undefined, { dateStyle: "short", timeStyle: "short" }),
-    made("span", { class: "code" }, fit.request.model),
+    made("span", { class: "code" }, nameOf(fit)),
     fit.request.loss,
     fit.status,
     made("div", { class: "row tight" }, opening(fit), removal(fit)),
@@ -49,16 +49,16 @@ function show() {
 /** @param {any} fit */
 function opening(fit) {
   const press = () => open([fit.id]).then(() => at("measurement").scrollIntoView());
-  return made("button", { type: "button", class: "small", onclick: press, "aria-label": `Open ${fit.request.model}` }, "Open");
+  return made("button", { type: "button", class: "small", onclick: press, "aria-label": `Open ${nameOf(fit)}` }, "Open");
 }
 
 /** A button that asks once more before it removes. @param {any} fit */
 function removal(fit) {
-  const button = made("button", { type: "button", class: "small", "aria-label": `Remove ${fit.request.model}` }, "Remove");
+  const button = made("button", { type: "button", class: "small", "aria-label": `Remove ${nameOf(fit)}` }, "Remove");
   button.addEventListener("click", async () => {
     if (button.textContent === "Remove") {
       button.textContent = "Really remove?";
-      button.setAttribute("aria-label", `Really remove ${fit.request.model}?`);
+      button.setAttribute("aria-label", `Really remove ${nameOf(fit)}?`);
       return;
     }
     try {
@@ -72,7 +72,7 @@ function removal(fit) {
   });
   button.addEventListener("blur", () => {
     button.textContent = "Remove";
-    button.setAttribute("aria-label", `Remove ${fit.request.model}`);
+    button.setAttribute("aria-label", `Remove ${nameOf(fit)}`);
   });
   return button;
 }

@@ -2,10 +2,11 @@
 
 import { ask, follow, get, Refusal } from "./api.js";
 import { at, complain, made, shown } from "./dom.js";
-import { changed, choose, ranked, state } from "./state.js";
+import { changed, choose, nameOf, ranked, state } from "./state.js";
 import { show } from "./measurement.js";
 
 const FINISHED = ["succeeded", "failed", "cancelled"];
+/** @type {Record<string, string>} */
 const WORDS = { queued: "waiting", running: "running", succeeded: "done", failed: "failed", cancelled: "cancelled" };
 
 /** @type {AbortController} ends the streams of the fits that leave the page */
@@ -44,6 +45,7 @@ export async function open(ids) {
   if (name === null || name === state.dataset?.id) return;
   state.dataset = state.samples = null;
   changed("dataset");
+  changed("samples");
   try {
     await show(await get(`/v1/datasets/${name}`));
   } catch (error) {
@@ -73,7 +75,7 @@ function present(fits) {
  * @param {AbortSignal} signal
  */
 function row(fit, signal) {
-  const name = fit.request.model ?? "several models";
+  const name = nameOf(fit);
   const bar = made("progress", { max: 1, "aria-label": `Progress of ${name}` });
   const said = made("span", { class: "note", role: "status" });
   const svg = sparkline(name);
@@ -86,7 +88,7 @@ function row(fit, signal) {
     const loss = progress?.loss ?? null;
     if (loss !== null && loss !== losses.at(-1)) losses.push(loss);
     bar.value = status === "succeeded" ? 1 : (progress?.fraction ?? 0);
-    said.textContent = `${WORDS[/** @type {keyof WORDS} */ (status)]}${loss === null ? "" : `, loss ${shown(loss)}`}`;
+    said.textContent = `${WORDS[status]}${loss === null ? "" : `, loss ${shown(loss)}`}`;
     svg.draw(losses);
     cancel.hidden = FINISHED.includes(status);
     failure.hidden = !error;

@@ -12,6 +12,8 @@ import { changed, chosen, materialOf, on, ranked, state } from "./state.js";
 
 const SCALES = { linear: "linear", cube_root: "cube root", log: "log" };
 
+const ENOUGH = 4; // measured points that are worth aiming the light at
+
 /** @type {Map<string, any>} answers about fits as they were fitted, which do not change */
 const known = new Map();
 
@@ -22,6 +24,7 @@ const against = latest(160, drawAgainst, (error) => complain("look-error", error
 export function install() {
   turnSolid();
   for (const topic of /** @type {const} */ (["chosen", "fits"])) on(topic, () => (topic === "chosen" || state.values === null) && whole());
+  on("samples", whole);
   on("view", () => { lobes(); against(); });
   on("values", () => { lobes(); against(); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { lobes(); against(); paint(); });
@@ -44,7 +47,7 @@ function aim() {
   if (state.samples === null || here(state.theta) > 0) return;
   const angles = Array.from({ length: 18 }, (_, k) => 5 * k);
   const best = angles.reduce((a, b) => (here(b) > here(a) ? b : a), 45);
-  if (best !== state.theta) state.theta = best;
+  if (here(best) >= ENOUGH) state.theta = best;
 }
 
 /** @returns {number[]} the angles of incidence of the samples, each once, at most 40 */
@@ -113,7 +116,7 @@ async function drawAgainst(signal) {
   if (fit === null) return;
   const fits = ranked();
   const json = (/** @type {import("./state.js").Fit} */ one) => ({ material: materialOf(one), theta_deg: THETAS, phi_deg: state.phi, tolerance: 1e-3 });
-  const integrated = async (/** @type {import("./state.js").Fit} */ one) => (await get("/v1/albedo", { method: "POST", json: json(one), signal })).values.map(([value]) => value);
+  const integrated = async (/** @type {import("./state.js").Fit} */ one) => (await get("/v1/albedo", { method: "POST", json: json(one), signal })).values.map((/** @type {(number | null)[]} */ [value]) => value);
   const albedos = await Promise.all(fits.map((one) => remembered(one, `albedo ${state.phi}`, () => integrated(one))));
   if (signal.aborted) return;
   await drawAlbedo(fits.map((one, k) => ({ name: one.result.model, values: albedos[k], chosen: one === fit })));
@@ -140,7 +143,7 @@ async function drawAgainst(signal) {
  */
 function evaluated(fit, pairs, which, signal) {
   const json = { material: materialOf(fit), ...pairs };
-  return remembered(fit, which, async () => (await get("/v1/evaluate", { method: "POST", json, signal })).f.map(([f]) => f));
+  return remembered(fit, which, async () => (await get("/v1/evaluate", { method: "POST", json, signal })).f.map((/** @type {(number | null)[]} */ [f]) => f));
 }
 
 /** @param {import("./state.js").Fit} fit @param {string} which */

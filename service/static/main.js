@@ -13,6 +13,7 @@ import * as offers from "./offers.js";
 import * as result from "./result.js";
 import { state } from "./state.js";
 import * as take from "./take.js";
+import * as where from "./where.js";
 
 key.install();
 measurement.install();
@@ -20,6 +21,7 @@ result.install();
 hand.install();
 look.install();
 take.install();
+where.install();
 within();
 window.addEventListener("hashchange", linked);
 await choice.install().catch((error) => complain("choose-error", error));

@@ -4,7 +4,10 @@ import { ask, get, Refusal } from "./api.js";
 import { at, complain, made, shown } from "./dom.js";
 import { changed, on, state } from "./state.js";
 
-/** What a file may leave unsaid: the question, and the answers with what each means. */
+/**
+ * What a file may leave unsaid: the question, and the answers with what each means.
+ * @type {Record<string, [string, [string, string][]]>}
+ */
 const QUESTIONS = {
   quantity: ["What are the values?", [
     ["brdf", "BRDF, without the cosine [1/sr]"],
@@ -41,15 +44,16 @@ function hover(event, over) {
 
 async function example() {
   const content = await (await ask("/static/example.csv")).blob();
-  await take(new File([content], "red_linoleum.csv"));
+  await take(new File([content], "red_linoleum.csv"), {}, "generated from published parameters with stated noise, not measured");
 }
 
 /**
  * Upload a file with what has been declared of it so far; ask for what it does not say.
  * @param {File} file
  * @param {Record<string, string>} declared
+ * @param {string} remark what else is known of it
  */
-async function take(file, declared = {}) {
+async function take(file, declared = {}, remark = "") {
   complain("measurement-error", null);
   at("ask").hidden = true;
   at("measurement-said").textContent = `Reading ${file.name} …`;
@@ -57,12 +61,12 @@ async function take(file, declared = {}) {
     const query = new URLSearchParams(declared);
     const headers = { "content-type": "application/octet-stream" };
     const dataset = await get(`/v1/datasets?${query}`, { method: "POST", body: file, headers });
-    at("measurement-said").textContent = `${file.name} was read.`;
+    at("measurement-said").textContent = `${file.name} was read${remark && `: ${remark}`}.`;
     await show(dataset);
   } catch (error) {
     at("measurement-said").textContent = "";
     const field = error instanceof Refusal ? error.field : null;
-    if (field !== null && field in QUESTIONS && !(field in declared)) question(file, declared, /** @type {keyof QUESTIONS} */ (field));
+    if (field !== null && field in QUESTIONS && !(field in declared)) question(file, declared, field);
     else complain("measurement-error", error);
   } finally {
     at("file").value = ""; // so that the same file can be chosen again
@@ -72,7 +76,7 @@ async function take(file, declared = {}) {
 /**
  * @param {File} file
  * @param {Record<string, string>} declared
- * @param {keyof QUESTIONS} field
+ * @param {string} field
  */
 function question(file, declared, field) {
   const [text, answers] = QUESTIONS[field];
@@ -100,8 +104,9 @@ export async function show(dataset) {
   state.dataset = dataset;
   state.samples = null;
   changed("dataset");
+  changed("samples");
   state.samples = await get(`/v1/datasets/${dataset.id}/samples?limit=2000`);
-  changed("view");
+  changed("samples");
 }
 
 function describe() {

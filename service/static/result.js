@@ -73,8 +73,16 @@ function detail() {
     made("p", { class: "hint" }, reciprocity(result.certificate)),
     made("p", {}, made("b", {}, result.status === "converged" ? "Converged. " : "Stopped early. "), result.message),
   );
+  if (result.chi_square) parts.push(made("p", {}, `Chi-square ${shown(result.chi_square[0])} for ${result.chi_square[1]} degrees of freedom.`));
+  if (result.conservation) parts.push(made("p", {}, conserved(result)));
   if (result.ladder?.length) parts.push(made("h3", {}, "How it was chosen"), ladder(result.ladder));
   at("details").replaceChildren(...parts);
+}
+
+/** @param {any} result */
+function conserved({ conservation, objective }) {
+  const { free_objective: free, free_max_albedo: most } = conservation;
+  return `Kept at 1 or below, the loss is ${shown(objective)}; free, it is ${shown(free)} with a largest albedo of ${most === null ? "infinity" : shown(most)}.`;
 }
 
 /** @param {any} certificate */

@@ -53,7 +53,7 @@ export function paint() {
   const seen = camera();
   const place = (/** @type {number[]} */ p) => {
     const [x, y, depth] = seen(p);
-    return [wide / 2 + size * x, 0.76 * high - size * y, depth];
+    return [wide / 2 + size * x, 0.74 * high - size * y, depth];
   };
   ground(pen, place);
   const r = radius(state.scale, Math.max(...mesh.f.map((value) => value ?? 0)));

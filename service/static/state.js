@@ -27,7 +27,7 @@ export const state = {
   values: null,
 };
 
-/** @typedef {"dataset" | "fits" | "chosen" | "view" | "values"} Topic */
+/** @typedef {"dataset" | "samples" | "fits" | "chosen" | "view" | "values"} Topic */
 
 /** @type {Map<Topic, (() => void)[]>} */
 const listeners = new Map();
@@ -56,6 +56,11 @@ export function chosen() {
 export function ranked() {
   const done = [...state.fits.values()].filter((fit) => fit.result);
   return done.sort((a, b) => (a.result.objective ?? Infinity) - (b.result.objective ?? Infinity));
+}
+
+/** @param {Fit} fit @returns {string} the text of the model that was asked for, or of the several that were compared */
+export function nameOf(fit) {
+  return fit.request.model ?? fit.request.models.join(", ");
 }
 
 /** Look at a fit, as it was fitted. @param {string} id */

@@ -3,7 +3,7 @@
 import { ask, hasKey } from "./api.js";
 import { at, complain, made, save } from "./dom.js";
 import { svg } from "./figures.js";
-import { chosen, on, state } from "./state.js";
+import { chosen, nameOf, on, state } from "./state.js";
 
 /** @type {string[]} formats of GET /v1/fits/{id}/export/{format}, where this service has it */
 let formats = [];
@@ -54,8 +54,10 @@ function button(text, action) {
 
 /** @param {import("./state.js").Fit} fit @param {string} name @param {string} kind */
 async function plot(fit, name, kind) {
-  const asked = name === "lobes" ? { scale: state.scale, theta_i_deg: String(state.theta), channel: fit.result.channels[state.channel] } : { phi_deg: String(state.phi), channel: fit.result.channels[state.channel] };
-  const answer = await ask(`/v1/fits/${fit.id}/plots/${name}.${kind}?${new URLSearchParams(asked)}`);
+  const asked = new URLSearchParams({ channel: fit.result.channels[state.channel] });
+  if (name === "albedo") asked.set("phi_deg", String(state.phi));
+  else asked.append("scale", state.scale), asked.append("theta_i_deg", String(state.theta));
+  const answer = await ask(`/v1/fits/${fit.id}/plots/${name}.${kind}?${asked}`);
   save(await answer.blob(), `${fit.id}_${name}.${kind}`);
 }
 
@@ -101,14 +103,14 @@ function python(fit) {
   return `from service.client import Client
 
 with Client("${location.origin}"${key}) as client:
-    fit = client.fit("FILE", model="${fit.request.model}"${options})
+    fit = client.fit("FILE", model="${nameOf(fit)}"${options})
     print(fit.report())`;
 }
 
 /** @param {import("./state.js").Fit} fit */
 function curl(fit) {
   const key = hasKey() ? " -H 'Authorization: Bearer KEY'" : "";
-  const body = JSON.stringify({ dataset: fit.request.dataset ?? "DATASET", model: fit.request.model, ...told(fit.request) }, null, 1).replaceAll("\n", "").replaceAll("{ ", "{");
+  const body = JSON.stringify({ dataset: fit.request.dataset ?? "DATASET", model: nameOf(fit), ...told(fit.request) }, null, 1).replaceAll("\n", "").replaceAll("{ ", "{");
   return `curl -sS${key} --data-binary @FILE ${location.origin}/v1/datasets
 curl -sS${key} -H 'Prefer: wait=30' -H 'Content-Type: application/json' \\
      ${location.origin}/v1/fits -d '${body}'`;
