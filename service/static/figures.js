@@ -3,6 +3,8 @@
 /** Id of the sheet of Plotly's maps; an element that has it keeps Plotly from adding that sheet, which the policy forbids. */
 const MAP_RULES = "ce8d464691048653ffe3a57c6c18ab566e8366f186677868cf724621a857b4fe";
 
+export const SERIES = 6; // colours of curves, in the order of the ranking
+
 /** @type {Promise<any> | null} */
 let fetched = null;
 
@@ -41,12 +43,9 @@ export function prepare() {
 export function colours() {
   const style = getComputedStyle(document.documentElement);
   const named = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim();
-  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
   return {
     ink: named("ink"), soft: named("soft"), line: named("line"), card: named("card"), accent: named("accent"), bad: named("bad"),
-    series: dark
-      ? ["#8bb8ff", "#ffb074", "#82d6a2", "#d9a2e8", "#ffd166", "#6fd3e3"]
-      : ["#1b4f9c", "#c2410c", "#17763f", "#7b2d8e", "#8a6100", "#0e7490"],
+    series: Array.from({ length: SERIES }, (_, k) => named(`series-${k}`)),
   };
 }
 

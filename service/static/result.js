@@ -1,6 +1,7 @@
 /** Step 4: what came out, the models ranked side by side and the chosen one in full. */
 
 import { at, made, shown, table } from "./dom.js";
+import { SERIES } from "./figures.js";
 import { choose, chosen, on, ranked, state } from "./state.js";
 
 const FEW = 4; // channels whose values are all shown at once
@@ -24,7 +25,7 @@ function rank() {
   const best = Object.fromEntries(losses.map((loss) => [loss, Math.min(...fits.map((fit) => fit.result.errors[loss] ?? Infinity))]));
   const rows = fits.map((fit, k) => [
     `${k + 1}`,
-    choice(fit),
+    choice(fit, k),
     ...losses.map((loss) => figure(fit.result.errors[loss], fits.length > 1 && fit.result.errors[loss] === best[loss])),
     energy(fit.result.certificate),
     `${fit.result.cost.seconds.toFixed(2)} s`,
@@ -39,10 +40,10 @@ function rank() {
   if (focused) at("ranking").querySelector("input:checked")?.focus();
 }
 
-/** @param {import("./state.js").Fit} fit */
-function choice(fit) {
+/** @param {import("./state.js").Fit} fit @param {number} rank from 0, which is the colour of its curves */
+function choice(fit, rank) {
   const radio = made("input", { type: "radio", name: "chosen-fit", checked: fit.id === state.chosen, onchange: () => choose(fit.id) });
-  return made("label", { class: "choice code" }, radio, made("span", {}, fit.result.model));
+  return made("label", { class: "choice code" }, radio, made("span", { class: `swatch swatch-${rank % SERIES}` }), made("span", {}, fit.result.model));
 }
 
 /** @param {number | null} value @param {boolean} best */

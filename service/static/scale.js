@@ -32,6 +32,6 @@ export function rings(scale, top) {
       ? [0.25, 0.5, 0.75, 1].map((share) => Number((share * top).toPrecision(2)))
       : [decade * 10, decade, decade / 10, decade / 100, decade / 1000].filter((value) => value <= 1.001 * top);
   // labels that would touch are left out
-  const kept = values.filter((value, k) => at(value) > 0.08 && values.slice(0, k).every((other) => scale === "linear" || at(other) - at(value) > 0.17));
+  const kept = values.filter((value, k) => at(value) > 0.08 && values.slice(0, k).every((other) => scale === "linear" || at(other) - at(value) > 0.24));
   return { tickvals: kept.map(at), ticktext: kept.map(shown) };
 }

@@ -31,6 +31,7 @@ ARGUMENTS = [
     "--no-first-run",
 ]
 KEY = "k" * 24
+SOLID = "document.getElementById('solid').toDataURL()"
 SOON = 30_000  # a fit and its figures on a busy machine [ms]
 SLOW = "lambert + kurt(anisotropic) + ggx + kurt"
 REFUSED = "Failed to load resource"  # the browser's own word on an expected refusal
@@ -101,7 +102,7 @@ def test_from_the_example_to_a_fit_again_by_keyboard_and_mouse(page: Any, url: s
     expect(page, "#polar-title").to_have_text("In the plane of incidence, light at 45°: 37 measured")
     for name in ("polar", "albedo", "residuals"):
         page.wait_for_selector(f"#{name} .main-svg")
-    assert page.evaluate("document.getElementById('solid').toDataURL().length") > 5000
+    assert len(page.evaluate(SOLID)) > 5000
     assert page.evaluate(UNLABELLED) == []
     assert page.evaluate(LOW_CONTRASTS) == []
 
@@ -117,6 +118,10 @@ def test_from_the_example_to_a_fit_again_by_keyboard_and_mouse(page: Any, url: s
     page.click("#as-fitted")
     expect(page, "#hand-said").to_contain_text("Error (cosine_rms) 0.04929 1/sr.")
     assert page.evaluate("document.querySelector('table').innerText").startswith("Models")
+    seen = page.evaluate(SOLID)
+    page.focus("#solid")
+    page.keyboard.press("ArrowLeft")
+    assert page.evaluate(SOLID) != seen
 
     with page.expect_download() as download:
         page.get_by_role("button", name="Report", exact=True).click()
@@ -135,6 +140,23 @@ def test_from_the_example_to_a_fit_again_by_keyboard_and_mouse(page: Any, url: s
     link = page.get_attribute("#permalink", "href")
     assert link == page.url
     assert page.evaluate("fetch(`/v1/fits/${location.hash.slice(5)}`).then((a) => a.json())")["request"]["starts"]
+
+
+def test_a_measurement_of_many_channels_from_file_to_figure(page: Any, measured: pathlib.Path) -> None:
+    page.set_input_files("#file", measured / "cornell" / "garnet_red.brdf")
+    expect(page, "#about").to_contain_text("31, 400 to 700")
+    only(page, "ward_bounded")
+    page.click("#start")
+    expect(page, "#details table tbody tr").to_have_count(3)  # one channel; the others are folded away
+    page.click("#details summary")
+    expect(page, "#details details tbody tr").to_have_count(31 + 31 + 1)
+    page.select_option("#channel", "30")
+    expect(page, "#details table tbody tr").to_have_count(3)
+    expect(page, "#details").to_contain_text("lambert.kd (700)")
+    expect(page, "#hand-said").to_contain_text("Error (cosine_rms)")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="albedo PNG").click()
+    assert pathlib.Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_dropped_file_is_asked_for_what_it_does_not_say(page: Any) -> None:
