@@ -10,7 +10,7 @@ COPY .ci/constraints.txt .ci/constraints.txt
 COPY pyproject.toml README.md LICENSE ./
 COPY brdfcore brdfcore
 COPY service service
-RUN /venv/bin/pip install --no-cache-dir -c .ci/constraints.txt .
+RUN /venv/bin/pip install --no-cache-dir -c .ci/constraints.txt '.[arrow]'
 
 FROM python:3.12-slim
 RUN useradd --create-home --uid 10001 brdf && install -d -o brdf -g brdf /data

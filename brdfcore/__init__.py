@@ -20,16 +20,23 @@ if TYPE_CHECKING:
     from .energy.certificate import Certificate, certify
     from .energy.hemispherical import hemispherical_albedo
     from .energy.tables import AlbedoTable, albedo_table
-    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, fit, fit_batch
+    from .exports import EXPORTS, Export, export
+    from .fitting import LOSSES, OPTIMIZERS, ROBUST, Fit, Progress, Rung, Support, fit, fit_batch, supports
+    from .fitting.comparison import Comparison, compare
+    from .fitting.held_out import HeldOut, held_out
+    from .fitting.next_directions import NextDirections, next_directions
     from .formats import FORMATS, read
+    from .formats.info import Info, info
     from .formats.samples import QUANTITIES, Samples
     from .models import MODELS, Model
     from .models.material import Material, material
     from .models.presets import PRESETS, Preset
+    from .tabulated import Tabulated, lawrence
 
 __version__ = version("brdfcore")
 
 __all__ = [
+    "EXPORTS",
     "FORMATS",
     "LOSSES",
     "MODELS",
@@ -40,28 +47,43 @@ __all__ = [
     "Albedo",
     "AlbedoTable",
     "Certificate",
+    "Comparison",
+    "Export",
     "Fit",
+    "HeldOut",
+    "Info",
     "Material",
     "Model",
+    "NextDirections",
     "Preset",
     "Progress",
+    "Rung",
     "Samples",
+    "Support",
+    "Tabulated",
     "__version__",
     "albedo",
     "albedo_table",
     "bounds",
     "certify",
+    "compare",
     "energy",
     "errors",
+    "export",
     "fit",
     "fit_batch",
     "hard_cases",
+    "held_out",
     "hemispherical_albedo",
+    "info",
+    "lawrence",
     "material",
+    "next_directions",
     "plots",
     "read",
     "sampling",
     "study",
+    "supports",
 ]
 
 _MODULES = {
@@ -69,12 +91,29 @@ _MODULES = {
     ".energy.certificate": ("Certificate", "certify"),
     ".energy.hemispherical": ("hemispherical_albedo",),
     ".energy.tables": ("AlbedoTable", "albedo_table"),
-    ".fitting": ("LOSSES", "OPTIMIZERS", "ROBUST", "Fit", "Progress", "fit", "fit_batch"),
+    ".fitting": (
+        "LOSSES",
+        "OPTIMIZERS",
+        "ROBUST",
+        "Fit",
+        "Progress",
+        "Rung",
+        "Support",
+        "fit",
+        "fit_batch",
+        "supports",
+    ),
+    ".fitting.comparison": ("Comparison", "compare"),
+    ".fitting.held_out": ("HeldOut", "held_out"),
+    ".fitting.next_directions": ("NextDirections", "next_directions"),
+    ".exports": ("EXPORTS", "Export", "export"),
     ".formats": ("FORMATS", "read"),
+    ".formats.info": ("Info", "info"),
     ".formats.samples": ("QUANTITIES", "Samples"),
     ".models": ("MODELS", "Model"),
     ".models.material": ("Material", "material"),
     ".models.presets": ("PRESETS", "Preset"),
+    ".tabulated": ("Tabulated", "lawrence"),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 

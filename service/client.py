@@ -36,6 +36,7 @@ from .client_results import (
     AsyncFitResult,
     AsyncTableResult,
     BatchResult,
+    ExportedFile,
     FitResult,
     TableResult,
 )
@@ -47,6 +48,8 @@ from .schemas import (
     FitPage,
     FitSummary,
     FitView,
+    FormatList,
+    FormatView,
     JobStatus,
     ModelList,
     ModelView,
@@ -62,6 +65,7 @@ __all__ = [
     "BatchResult",
     "Client",
     "ClientError",
+    "ExportedFile",
     "FitFailedError",
     "FitOptions",
     "FitResult",
@@ -78,12 +82,13 @@ TRIES = 4  # of one request
 _BUSY = (429, 503)
 _FIRST, _LONGEST = 0.25, 30.0  # pauses between them [s]
 _PIECE = 2**20  # bytes of a file that are sent at once
+_DECLARED = ("format", "quantity", "angle_unit", "columns")  # of a file
 _T = TypeVar("_T")
 Material = Any  # a text, a preset's name, its JSON, or an object like brdfcore.Material
 
 
 class FitOptions(TypedDict, total=False):
-    """What may be asked of a fit, as fields of POST /v1/fits; format, quantity and angle_unit declare a file."""
+    """What may be asked of a fit, as fields of POST /v1/fits; format to columns declare what a file does not say."""
 
     loss: str
     optimizer: str
@@ -100,6 +105,7 @@ class FitOptions(TypedDict, total=False):
     format: str | None
     quantity: str | None
     angle_unit: str | None
+    columns: str | None
 
 
 class _Shared:
@@ -110,7 +116,7 @@ class _Shared:
         data: Any, model: str, options: FitOptions, *, wait: bool, timeout: float | None, progress: Tell | None
     ) -> Call[FitView]:
         begun = time.monotonic()
-        declared = {name: options.get(name) for name in ("format", "quantity", "angle_unit")}
+        declared = {name: options.get(name) for name in _DECLARED}
         asked = {name: value for name, value in options.items() if name not in declared}
         body = yield from calls.fit_body(data, {"model": model, **asked}, declared)
         at_once = wait and progress is None
@@ -122,7 +128,7 @@ class _Shared:
 
     @staticmethod
     def _batch(data: Iterable[Any], models: Sequence[str], options: FitOptions) -> Call[BatchView]:
-        declared = {name: options.get(name) for name in ("format", "quantity", "angle_unit")}
+        declared = {name: options.get(name) for name in _DECLARED}
         body = {name: calls.plain(value) for name, value in options.items() if name not in declared}
         body |= {"models": list(models), "datasets": []}
         for one in data:
@@ -177,6 +183,10 @@ class Client(_Shared):
         """Every model that a fit's text may name."""
         return self._run(calls.read(ModelList, "GET", "/v1/models")).items
 
+    def formats(self) -> list[FormatView]:
+        """Every format of measured files that is read, and whether one file of it can be uploaded."""
+        return self._run(calls.read(FormatList, "GET", "/v1/formats")).items
+
     def upload(
         self,
         path: str | os.PathLike[str],
@@ -184,9 +194,10 @@ class Client(_Shared):
         format: str | None = None,  # noqa: A002 - as in brdfcore.read
         quantity: str | None = None,
         angle_unit: str | None = None,
+        columns: str | None = None,
     ) -> DatasetView:
         """The dataset made of a measured file, which is streamed from the disk."""
-        declared = {"format": format, "quantity": quantity, "angle_unit": angle_unit}
+        declared = {"format": format, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
         return self._run(calls.uploaded(path, declared))
 
     def fit(
@@ -341,6 +352,10 @@ class AsyncClient(_Shared):
         """Every model that a fit's text may name."""
         return (await self._run(calls.read(ModelList, "GET", "/v1/models"))).items
 
+    async def formats(self) -> list[FormatView]:
+        """Every format of measured files that is read, as `Client.formats` gives them."""
+        return (await self._run(calls.read(FormatList, "GET", "/v1/formats"))).items
+
     async def upload(
         self,
         path: str | os.PathLike[str],
@@ -348,9 +363,10 @@ class AsyncClient(_Shared):
         format: str | None = None,  # noqa: A002 - as in brdfcore.read
         quantity: str | None = None,
         angle_unit: str | None = None,
+        columns: str | None = None,
     ) -> DatasetView:
         """The dataset made of a measured file, which is streamed from the disk."""
-        declared = {"format": format, "quantity": quantity, "angle_unit": angle_unit}
+        declared = {"format": format, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
         return await self._run(calls.uploaded(path, declared))
 
     async def fit(

@@ -50,6 +50,11 @@ def read(view: type[_View], method: str, path: str, **what: Any) -> Call[_View]:
     return view.model_validate_json(answer.content)
 
 
+def answered(method: str, path: str, **what: Any) -> Call[Any]:
+    """The answer itself, where its headers count."""
+    return (yield Ask(method, path, what))
+
+
 def content(method: str, path: str, **what: Any) -> Call[bytes]:
     """The bytes that the service answers."""
     answer = yield Ask(method, path, what)

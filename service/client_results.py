@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 from . import client_calls as calls
@@ -25,6 +26,16 @@ from .schemas import (
 
 if TYPE_CHECKING:
     from brdfcore.models.material import Material
+
+
+@dataclass(frozen=True)
+class ExportedFile:
+    """A fitted material as another program's file, what it holds, and how far from the material that is."""
+
+    content: bytes
+    difference: float  # relative RMS difference of f cos theta_i [1]
+    holds: str
+
 
 View = TypeVar("View", bound=JobView)
 Run = Callable[[Call[Any]], Any]  # takes the steps of a call and gives its result
@@ -80,7 +91,8 @@ class _Fit(_Job[FitView]):
     _path, _name, _failed = "/v1/fits", "fit", FitFailedError
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.id}, {self.view.request.model!r}, {self.job_status})"
+        model = self.view.request.models or self.view.request.model
+        return f"{type(self).__name__}({self.id}, {model!r}, {self.job_status})"
 
     @property
     def result(self) -> FitOutcome:
@@ -106,12 +118,12 @@ class _Fit(_Job[FitView]):
 
     @property
     def status(self) -> str:
-        """How the fit ended, "converged" or "stopped_early"."""
+        """How the fit ended: "converged", "undetermined" (so, but some values are free) or "stopped_early"."""
         return self.result.status
 
     @property
     def undetermined(self) -> list[str]:
-        """The parameters that the data do not determine."""
+        """What the data do not determine: keys, or "key with key" where only the combination is."""
         return self.result.undetermined
 
     @property
@@ -138,6 +150,11 @@ class _Fit(_Job[FitView]):
     def _drawn(self, name: str, kind: str, **asked: Any) -> Call[bytes]:
         given = {key: value for key, value in asked.items() if value is not None}
         return (yield from calls.content("GET", f"{self._path}/{self.id}/plots/{name}.{kind}", params=given))
+
+    def _exported(self, name: str) -> Call[ExportedFile]:
+        answer = yield from calls.answered("GET", f"{self._path}/{self.id}/export/{name}")
+        difference = float(answer.headers["x-brdf-difference"])
+        return ExportedFile(bytes(answer.content), difference, answer.headers["x-brdf-holds"])
 
 
 class _Table(_Job[TableView]):
@@ -271,6 +288,11 @@ class FitResult(_Fit, _Waiting[FitView]):
         image: bytes = self._run(self._drawn(name, kind, scale=scale, theta_i_deg=theta_i_deg, channel=channel))
         return image
 
+    def export(self, format: str) -> ExportedFile:  # noqa: A002 - the name that the library and the service use
+        """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json."""
+        file: ExportedFile = self._run(self._exported(format))
+        return file
+
 
 class AsyncFitResult(_Fit, _Awaited[FitView]):
     """The same, to be awaited."""
@@ -288,6 +310,11 @@ class AsyncFitResult(_Fit, _Awaited[FitView]):
         drawn = self._drawn(name, kind, scale=scale, theta_i_deg=theta_i_deg, channel=channel)
         image: bytes = await self._run(drawn)
         return image
+
+    async def export(self, format: str) -> ExportedFile:  # noqa: A002 - the name that the library and the service use
+        """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json."""
+        file: ExportedFile = await self._run(self._exported(format))
+        return file
 
 
 class BatchResult(_Batch):

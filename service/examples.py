@@ -51,6 +51,7 @@ PARAMETERS: dict[str, Any] = {
     "format": "csv",
     "quantity": "brdf",
     "angle_unit": "degrees",
+    "columns": "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value",
     "scale": "log",
     "theta_i_deg": [30, 60],
     "channel": "r",

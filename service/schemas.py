@@ -152,17 +152,32 @@ class FitRequest(FitOptions):
 
     dataset: str | None = Field(None, description="id that POST /v1/datasets gave")
     samples: InlineSamples | None = None
-    model: str = Field(min_length=1, max_length=2000, description="for example lambert + ward_bounded")
+    model: str | None = Field(
+        None,
+        min_length=1,
+        max_length=2000,
+        description='for example lambert + ward_bounded; "auto" chooses the effects that the data call for',
+    )
+    models: list[Annotated[str, Field(min_length=1, max_length=2000)]] | None = Field(
+        None, min_length=1, max_length=32, description="instead of model, several that are compared"
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         if (self.dataset is None) == (self.samples is None):
             raise ValueError("Expected either dataset or samples to be given. Give exactly one of them.")
+        if (self.model is None) == (self.models is None):
+            raise ValueError("Expected either model or models to be given. Give exactly one of them.")
         return self
 
+    @property
+    def asked(self) -> str | list[str]:
+        """The model, or the models that are compared."""
+        return self.models or self.model or ""
+
     def arguments(self) -> dict[str, Any]:
-        """What `brdfcore.fit` and its check are asked, by keyword: everything but the data."""
-        found = self.model_dump(exclude={"dataset", "samples", "max_theta_deg"})
+        """What `brdfcore.fit` or `compare` is asked, by keyword: everything but the data and the models."""
+        found = self.model_dump(exclude={"dataset", "samples", "model", "models", "max_theta_deg"})
         return {**found, "max_theta": None if self.max_theta_deg is None else math.radians(self.max_theta_deg)}
 
 
@@ -298,7 +313,8 @@ class RequestView(View):
 
     dataset: str | None
     samples: SamplesView | None
-    model: str
+    model: str | None
+    models: list[str] | None = None
     loss: str
     optimizer: str
     fixed: dict[str, float | list[float]]
@@ -360,6 +376,20 @@ class ConservationView(View):
 Interval = tuple[float, float] | None
 
 
+class RungView(View):
+    """A material that was tried on the way to the chosen one, and how it did."""
+
+    effect: str
+    model: str
+    error: float | None = Field(description="root mean square of the loss's residuals")
+    held_out: float | None = Field(description="the same at incidences that were left out")
+    criterion: float | None = Field(description="below 0 it asks for the richer of the two materials compared [1]")
+    parameters: int
+    seconds: float
+    kept: bool
+    reason: str
+
+
 class FitOutcome(View):
     """A finished fit, exactly as `Fit.to_dict()` gives it; null where there is no finite number."""
 
@@ -368,14 +398,26 @@ class FitOutcome(View):
     material: dict[str, Any]
     loss: str
     objective: float | None
-    status: Literal["converged", "stopped_early"]
+    status: Literal["converged", "undetermined", "stopped_early"] = Field(
+        description="undetermined: converged, but the data leave some values free"
+    )
     message: str
     parameters: dict[str, float | list[float | None] | None]
     standard_errors: dict[str, float | list[float | None] | None]
     intervals: dict[str, Interval | list[Interval]]
     units: dict[str, str]
     errors: dict[str, float | None]
-    undetermined: list[str]
+    undetermined: list[str] = Field(
+        description='what the data leave free: keys, or "key with key" where only the combination is determined'
+    )
+    combinations: list[dict[str, float]] = Field(
+        description="for each such combination, how its values change together, in their units, of length 1"
+    )
+    singular_values: list[float] = Field(description="of the Jacobian, its columns scaled to length 1, falling")
+    covariance_keys: list[str] = Field(description="the rows and columns of covariance and correlations")
+    covariance: list[list[float]] | None = Field(description="in the parameters' units; null for none or more than 32")
+    correlations: list[list[float]] | None
+    warnings: list[str] = Field(description="what the data cannot show of this model, a sentence each")
     choices: list[str]
     fixed: list[str]
     gray: list[str]
@@ -387,7 +429,38 @@ class FitOutcome(View):
     channels: list[str]
     data: dict[str, Any]
     provenance: dict[str, Any]
+    ladder: list[RungView] = Field([], description="the materials that were tried, where the fit chose among several")
     report: str = Field(description="all of this as plain text, for people")
+
+
+class RankedView(View):
+    """One of the models that were compared, with its fit."""
+
+    rank: int
+    model: str
+    errors: dict[str, float | None]
+    objective: float | None
+    status: Literal["converged", "stopped_early"]
+    message: str
+    undetermined: list[str]
+    parameters: int = Field(description="free values, channels counted")
+    seconds: float
+    fit: FitOutcome
+
+
+class ComparisonView(View):
+    """Several models at the same samples, that with the lowest minimised loss first."""
+
+    loss: str
+    ranking: list[RankedView]
+    seconds: float
+    report: str
+
+
+class ComparedOutcome(FitOutcome):
+    """The best of several models' fits, and the comparison of all."""
+
+    comparison: ComparisonView
 
 
 class FitSummary(JobView):
@@ -399,7 +472,7 @@ class FitSummary(JobView):
 class FitView(FitSummary):
     """A fit and, once it has succeeded, its result."""
 
-    result: FitOutcome | None
+    result: ComparedOutcome | FitOutcome | None
 
 
 class FitPage(View):
@@ -416,7 +489,7 @@ class BatchRow(View):
     model: str
     fit: str = Field(description="id of the fit")
     status: JobStatus
-    fit_status: Literal["converged", "stopped_early"] | None
+    fit_status: Literal["converged", "undetermined", "stopped_early"] | None
     errors: dict[str, float | None] | None
     parameters: dict[str, float | list[float | None] | None] | None
     undetermined: list[str] | None
@@ -455,7 +528,9 @@ class DatasetView(View):
     id: str
     bytes: int
     sha256: str
-    declared: dict[str, str | None] = Field(description="format, quantity and angle_unit as the upload declared them")
+    declared: dict[str, str | None] = Field(
+        description="format, quantity, angle_unit and columns as the upload declared them"
+    )
     created: datetime
     report: dict[str, Any] = Field(description="what the samples are, what was masked and why")
 
@@ -497,6 +572,20 @@ class ModelList(View):
 
     items: list[ModelView]
     presets: list[PresetView]
+
+
+class FormatView(View):
+    """A format of measured files; an uploaded file is told by its content to have it."""
+
+    name: str = Field(description="what `format` takes, to insist on it")
+    description: str
+    uploads: bool = Field(description="whether one file holds it all, so that it can be uploaded")
+
+
+class FormatList(View):
+    """Every format of measured files that is read."""
+
+    items: list[FormatView]
 
 
 class HealthView(View):

@@ -24,10 +24,12 @@ FLOORS = [
     ["models"],
     ["hard_cases"],
     ["formats"],
+    ["tabulated"],
     ["sampling"],
     ["energy"],
     ["bounds"],
     ["fitting"],
+    ["exports"],
     ["render"],
     ["plots"],
     ["study"],
@@ -150,7 +152,7 @@ def test_files_stay_short(path):
 
 
 def test_importing_the_library_is_light():
-    heavy = ("matplotlib", "fastapi", "pydantic", "typer", "rich", "httpx2", "uvicorn", "scipy", "service")
+    heavy = ("matplotlib", "fastapi", "pydantic", "typer", "rich", "httpx2", "uvicorn", "scipy", "pyarrow", "service")
     script = (
         "import sys, brdfcore; brdfcore.material('lambert + kurt'); "
         f"print(*[name for name in {heavy!r} if name in sys.modules])"

@@ -35,6 +35,11 @@ def test_formats_are_the_registry() -> None:
     assert table(section("Measured data")) == {name: format_.description for name, format_ in bc.FORMATS.items()}
 
 
+def test_exports_are_the_registry() -> None:
+    rows = {name: exporter.description for name, exporter in bc.EXPORTS.items()}
+    assert table(section("Export")) == rows
+
+
 def test_losses_are_the_registry() -> None:
     assert list(table(section("Losses"))) == list(bc.LOSSES)
 
@@ -56,7 +61,9 @@ def test_every_setting_is_listed() -> None:
         assert f"`BRDF_{setting.name.upper()}`" in section("HTTP")
 
 
-@pytest.mark.parametrize("title", ["Python", "Bounds and sampling", "Energy"])
+@pytest.mark.parametrize(
+    "title", ["Python", "Which model, and where to measure next", "Bounds and sampling", "Energy", "Export"]
+)
 def test_python_examples_print_what_the_readme_shows(
     title: str, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -4,7 +4,7 @@ import sys
 
 import typer
 
-from . import albedo, check, demo, fit, models, serve, study
+from . import albedo, check, compare, convert, demo, export, fit, info, models, serve, study
 
 app = typer.Typer(
     name="brdf",
@@ -14,9 +14,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("fit")(fit.command)
+app.command("compare")(compare.command)
+app.command("info")(info.command)
+app.command("convert")(convert.command)
 app.command("models")(models.command)
 app.command("albedo")(albedo.command)
 app.command("check")(check.command)
+app.command("export")(export.command)
 app.command("study")(study.command)
 app.command("serve")(serve.command)
 app.command("demo")(demo.command)

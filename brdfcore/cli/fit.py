@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from ._reading import AngleUnitOption, ColumnsOption, FileArgument, FormatOption, MaterialOption, QuantityOption
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -14,10 +16,14 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+_TITLES = {"lobes": "Lobe plot", "residuals": "Residuals"}
+
 
 def command(
-    file: Annotated[Path, typer.Argument(help="A measured file of any known format.", show_default=False)],
-    model: Annotated[str, typer.Option(help='A material, as in "lambert + ward_bounded".', show_default=False)],
+    file: FileArgument,
+    model: Annotated[
+        str, typer.Option(help='A material, as in "lambert + ward_bounded", or auto.', show_default=False)
+    ],
     loss: Annotated[str, typer.Option(help="cosine, l2, log, cube_root or relative.")] = "cosine",
     optimizer: Annotated[str, typer.Option(help="auto, least_squares, lbfgs or adam.")] = "auto",
     fixed: Annotated[list[str] | None, typer.Option(help="KEY=VALUE to keep, as kurt.f0=0.04; repeatable.")] = None,
@@ -29,13 +35,14 @@ def command(
     robust_scale: Annotated[float | None, typer.Option(help="Residual from which they do; else the data say.")] = None,
     max_theta_deg: Annotated[float | None, typer.Option(help="Leave steeper samples out [degrees].")] = None,
     conserve_energy: Annotated[bool, typer.Option("--conserve-energy", help="Keep every albedo at 1 or less.")] = False,
-    format_: Annotated[str | None, typer.Option("--format", help="Insist on a format; else its content tells.")] = None,
-    quantity: Annotated[
-        str | None, typer.Option(help="brdf, brdf_cos or reflectance_factor, where the file does not say.")
-    ] = None,
-    angle_unit: Annotated[str | None, typer.Option(help="degrees or radians, where the file does not say.")] = None,
+    format_: FormatOption = None,
+    quantity: QuantityOption = None,
+    angle_unit: AngleUnitOption = None,
+    columns: ColumnsOption = None,
+    which: MaterialOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Write the lobe plot to this .svg or .png file.")] = None,
+    residuals: Annotated[Path | None, typer.Option(help="Write the residuals by angle to this .svg or .png.")] = None,
     scale: Annotated[str, typer.Option(help="Of the plot's radius: linear, cube_root or log.")] = "linear",
     channel: Annotated[str | None, typer.Option(help="The channel that is plotted; else the brightest.")] = None,
     server: Annotated[str | None, typer.Option(help="Let the service at this URL do the work.")] = None,
@@ -55,18 +62,28 @@ def command(
         "robust_scale": robust_scale,
         "conserve_energy": conserve_energy,
     }
-    declared = {"format": format_, "quantity": quantity, "angle_unit": angle_unit}
+    declared = {"format": format_, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
     if server is not None:
+        if which is not None:
+            from ..errors import InvalidValueError
+
+            raise InvalidValueError(
+                "Expected --material to go without --server, which takes files of one material, got both. "
+                "Send what `brdf convert` makes of the file.",
+                field="material",
+            )
         drawn = {"scale": scale, "channel": channel}
-        _remote(server, api_key, file, asked | declared | {"max_theta_deg": max_theta_deg}, as_json, plot, drawn)
+        images = {"lobes": (plot, drawn), "residuals": (residuals, {"channel": channel})}
+        _remote(server, api_key, file, asked | declared | {"max_theta_deg": max_theta_deg}, as_json, images)
         return
     import brdfcore as bc
 
-    if plot is not None:  # what cannot be drawn is refused before the work, not after it
-        bc.plots.kind_of(plot)
-        bc.plots.check_scale(scale)
+    for path in (plot, residuals):  # what cannot be drawn is refused before the work, not after it
+        if path is not None:
+            bc.plots.kind_of(path)
+            bc.plots.check_scale(scale)
     max_theta = None if max_theta_deg is None else math.radians(max_theta_deg)
-    samples = bc.read(file, **declared)
+    samples = bc.read(file, **declared, material=which)
 
     def run(progress: "Callable[[Progress], None] | None") -> "Fit":
         return bc.fit(samples, **asked, max_theta=max_theta, progress=progress)
@@ -75,7 +92,10 @@ def command(
     typer.echo(json.dumps(result.to_dict(), indent=2) if as_json else result.report())
     if plot is not None:
         figure = bc.plots.lobes(result.material, samples, scale=scale, channel=channel)
-        typer.echo(f"Lobe plot: {bc.plots.save(figure, plot)}", err=as_json)
+        typer.echo(f"{_TITLES['lobes']}: {bc.plots.save(figure, plot)}", err=as_json)
+    if residuals is not None:
+        figure = bc.plots.residuals(result, channel=channel)
+        typer.echo(f"{_TITLES['residuals']}: {bc.plots.save(figure, residuals)}", err=as_json)
 
 
 def _remote(
@@ -84,8 +104,7 @@ def _remote(
     file: Path,
     asked: dict[str, Any],
     as_json: bool,
-    plot: Path | None,
-    drawn: dict[str, Any],
+    images: dict[str, tuple[Path | None, dict[str, Any]]],
 ) -> None:
     """The same, done by a service."""
     from service.client import Client, ClientError
@@ -93,14 +112,14 @@ def _remote(
     from .. import plots
     from ..errors import BrdfError
 
-    kind = "svg" if plot is None else plots.kind_of(plot)
+    wanted = [(name, path, plots.kind_of(path), drawn) for name, (path, drawn) in images.items() if path is not None]
     try:
         with Client(server, api_key) as client:
             fit = _with_bar(lambda progress: client.fit(file, **asked, progress=progress))
             typer.echo(fit.result.model_dump_json(indent=2) if as_json else fit.report())
-            if plot is not None:
-                plot.write_bytes(fit.plot("lobes", kind, **drawn))
-                typer.echo(f"Lobe plot: {plot}", err=as_json)
+            for name, path, kind, drawn in wanted:
+                path.write_bytes(fit.plot(name, kind, **drawn))
+                typer.echo(f"{_TITLES[name]}: {path}", err=as_json)
     except ClientError as error:
         raise BrdfError(str(error)) from error
 

@@ -19,6 +19,8 @@ from torch import Tensor
 from ..errors import InvalidValueError
 from ..models.form import Form
 from ..models.material import Material
+from ..tabulated import Tabulated
+from .measured import of_table
 from .plan import METHODS, plan
 
 __all__ = ["METHODS", "Albedo", "albedo", "of_form"]
@@ -38,7 +40,7 @@ class Albedo:
 
 
 def albedo(
-    material: Material,
+    material: Material | Tabulated,
     theta: float | Tensor,
     phi: float | Tensor = 0.0,
     tolerance: float = 1e-6,
@@ -48,10 +50,11 @@ def albedo(
 
     theta in [0, pi/2) and phi, polar angle and azimuth of wo [rad], broadcast. The claimed `error` is at most
     tolerance * max(1, value) where `met` says so; 1e-12 is a reference. `METHODS` names the methods: "auto" takes the
-    cheapest for each term, the others are there to be compared. Raises InvalidValueError for angles outside of the
-    range and a method that does not suit a term, UnknownNameError for a method that does not exist.
+    cheapest for each term, the others are there to be compared; a measured grid is sampled (measured.py). Raises
+    InvalidValueError for angles outside of the range and a method that does not suit a term, UnknownNameError for a
+    method that does not exist.
     """
-    device = next(material.parameters()).device
+    device = torch.device("cpu") if isinstance(material, Tabulated) else next(material.parameters()).device
     theta, phi = (torch.as_tensor(angle, dtype=torch.float64, device=device).detach() for angle in (theta, phi))
     wrong = ~((theta >= 0) & (theta < math.pi / 2))
     if bool(wrong.any()):
@@ -60,6 +63,15 @@ def albedo(
             "Give the polar angle in radians.",
             field="theta",
         )
+    if isinstance(material, Tabulated):
+        if method not in ("auto", "sobol"):
+            raise InvalidValueError(
+                f"Expected method to be auto or sobol for a measured grid, got {method!r}. Leave it out.",
+                field="method",
+            )
+        values, error, evaluations, seconds = of_table(material, theta, phi, tolerance)
+        met = bool((error <= tolerance * values.clamp(min=1)).all())
+        return Albedo(values, error, tolerance, met, evaluations, "sobol", seconds)
     return of_form(material.form, material.values(), torch.cos(theta), phi, tolerance, method)
 
 

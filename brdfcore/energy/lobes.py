@@ -2,7 +2,8 @@
 
 `fall`: how it falls with the half vector's slope r: "gaussian" like exp(-(r/w)^2), "power" like (1 + r^2)^(-1/w^2),
 "algebraic" like (r/w)^-4, "none". `end`: f cos theta_i goes to 0 at the horizon like an integer power of cos theta_i
-(1), like a multiple of a half (2), or like any power (4). `start`: it has a feature where cos theta_i grows out of
+(1), like a multiple of a half (2), or like any power (4); `layer`: only where cos theta_i is below the width, by what
+is worth its cube. `start`: it has a feature where cos theta_i grows out of
 cos theta_o, at r = 1/(T cos phi), T = tan theta_o. `kink`: it has none, one where cos theta_i = cos theta_o ("equal"),
 or Cook and Torrance's three ("grooves"). `smith`: its masking has a feature at wi = n, of the width's reciprocal.
 """
@@ -21,6 +22,7 @@ class Profile(NamedTuple):
 
     fall: Literal["gaussian", "power", "algebraic", "none"]
     end: Literal[1, 2, 4] = 1
+    layer: bool = False
     start: bool = False
     kink: Literal["none", "equal", "grooves"] = "none"
     smith: bool = False
@@ -38,7 +40,7 @@ PROFILES = {
     "blinn_phong": Profile("power"),
     "cook_torrance": Profile("gaussian", kink="grooves"),
     "ashikhmin_premoze": Profile("gaussian", start=True),
-    "ggx": Profile("algebraic", start=True, smith=True),
+    "ggx": Profile("algebraic", end=2, layer=True, start=True, smith=True),
     "beckmann": Profile("gaussian", start=True, smith=True),
 }
 

@@ -43,6 +43,7 @@ RULES: dict[str, type[Integral] | type[Hemisphere]] = {
 NEGLECTED = 1e-4  # of the tolerance, outside of the nodes' reach
 LEAST_NEGLECTED = 3e-17  # a rounding
 ROUNDING = 4e-15  # of a closed form
+SINGLE_SHARE = 0.98  # of the tolerance, for what a rule integrates; what is returned beside it is wrong by the rest
 LEAST_WEIGHT = 0.1  # of a basis with a smaller coefficient: the derivative by a reflectance needs its integral, too
 
 
@@ -139,7 +140,8 @@ def plan(
         shapes = (value.shape[:-1] for value in values.values() if value.ndim > 1)
         lead = tuple(torch.broadcast_shapes(cos_o.shape, azimuth.shape, *shapes))
         rows = Rows(cos_o.expand(lead).reshape(-1), azimuth.expand(lead).reshape(-1))
-        flat = {key: value.detach() for key, value in flattened(values, lead).items()}
+        # copies: nodes stay where they are when the values are changed in place
+        flat = {key: value.detach().clone() for key, value in flattened(values, lead).items()}
         rule: Drawn | tuple[_Part, ...]
         if method in ("monte_carlo", "sobol"):
             rule, found, error, evaluations = drawn(form, flat, rows, tolerance, method)
@@ -188,7 +190,7 @@ def _planned(
     kind = SINGLE[model.name] if method == "closed_form" else RULES[method]
     rule = kind(lobe, own, rows, max(NEGLECTED * tolerance, LEAST_NEGLECTED))
     weights = torch.stack(torch.broadcast_tensors(*(c.abs() for c in coefficients)), dim=1)
-    found = rule.solve(weights.clamp(min=LEAST_WEIGHT), tolerance)
+    found = rule.solve(weights.clamp(min=LEAST_WEIGHT), SINGLE_SHARE * tolerance)
     part = _Part(term, method, rows, rule, tolerance)
     returned_albedo, returned_error = part.returned(own)
     claimed = (torch.where(c == 0, 0.0, c.abs() * e) for c, e in zip(coefficients, found.error.unbind(1), strict=True))

@@ -3,22 +3,47 @@
     a = integral of f cos theta_i d(cos theta_i) dphi_i                                                       [1]
 
 For comparison. It converges fast for smooth diffuse terms; a lobe narrower than its steps it may miss altogether, and
-then the error that its differences claim is worth nothing.
+then the differences of its sizes tell nothing. So what it finds is compared with the mean weight of a few of the lobe's
+own samples: where these disagree by more than chance, the disagreement counts as error, and more nodes are tried.
 """
 
 import torch
 from torch import Tensor
 
 from ..geometry import from_angles, geometry
+from ..models import Model
 from ..parameters import Values
-from .refinement import Integral, Sums, take
+from .refinement import Integral, Rows, Sums, take
 from .rules import LADDER, gauss, ring
+
+DRAWN, SEED = 256, 20100629  # samples, and what seeds them
+SURE = 4.0  # standard errors that chance hardly exceeds
 
 
 class Product(Integral):
     """The integrals over the hemisphere in spherical coordinates."""
 
-    last = (LADDER.index(512), LADDER.index(512))
+    last = (LADDER.index(256), LADDER.index(256))
+
+    def __init__(self, model: Model, place: Values, rows: Rows, error: float) -> None:
+        super().__init__(model, place, rows, error)
+        points = torch.rand(DRAWN, 2, dtype=torch.float64, generator=torch.Generator().manual_seed(SEED))
+        with torch.no_grad():
+            wo = _towards(rows)[:, None].expand(-1, DRAWN, -1)
+            placed = {name: value[:, None] for name, value in self.place.items()}
+            wi = model.sample(placed, wo, points.to(wo.device).expand(len(wo), -1, -1))
+            g = geometry(wi, wo, model.needs | model.pdf_needs)
+            density = model.pdf(placed, g)
+            used = g.above & (density > 0)
+            factor = torch.where(used, wi[..., 2:] / torch.where(used, density, 1.0), 0.0)
+            bases = torch.broadcast_tensors(*model.basis(placed, g), factor)[:-1]
+            weights = torch.stack([basis * factor for basis in bases], dim=1)
+        self.mean, self.chance = weights.mean(2), SURE * weights.std(2) / DRAWN**0.5  # (R, K, 1 or C)
+
+    def missed(self, chosen: Tensor, bases: Tensor) -> Tensor:
+        """What the bases (r, K, 1 or C) of the chosen rows may lack beyond what the differences of sizes tell."""
+        apart, chance = (bases - self.mean[chosen]).abs(), self.chance[chosen]
+        return torch.where(apart > chance, apart + chance, 0.0)
 
     def guess(self, digits: float) -> tuple[float, float]:
         """About the sizes that leave an error of 10^-digits for a diffuse term."""
@@ -30,12 +55,12 @@ class Product(Integral):
 
     def sums(self, own: Values, chosen: Tensor, outer: int, inner: int) -> Sums:
         """The integrals of the chosen rows for values (R or 1, 1 or C), which may be differentiated."""
-        co, toward = self.rows.take(chosen)
+        rows = self.rows.take(chosen)
+        co, wo = rows.co, _towards(rows)
         heights, turns = gauss(inner).to(co.device), ring(2 * outer, mirrored=False).to(co.device)
         z = heights.nodes[:, None]
         wi = from_angles(torch.acos(z), turns.nodes)
         wi = torch.cat([wi[..., :2], z.expand(-1, 2 * outer)[..., None]], -1)
-        wo = torch.stack([*(torch.sqrt((1 - co) * (1 + co)) * f(toward) for f in (torch.cos, torch.sin)), co], -1)
         weight = ((heights.weights * heights.nodes)[:, None] * turns.weights)[..., None]
         g = geometry(wi, wo[:, None, None], self.model.needs)
         bases = self.model.basis({name: value[:, None, None] for name, value in take(own, chosen).items()}, g)
@@ -49,3 +74,9 @@ class Product(Integral):
             heights.tail(detached.sum(3)),
             co.new_zeros(len(chosen), 1, 1),
         )
+
+
+def _towards(rows: Rows) -> Tensor:
+    """The directions wo, (R, 3)."""
+    sine = torch.sqrt((1 - rows.co) * (1 + rows.co))
+    return torch.stack([sine * torch.cos(rows.azimuth), sine * torch.sin(rows.azimuth), rows.co], -1)

@@ -4,9 +4,12 @@
 
 For comparison, and as a check that shares nothing with the quadrature. `monte_carlo` claims `SURE_RANDOM` standard
 errors of the mean, `sobol` `SURE_SCRAMBLED` standard errors of the means of `SCRAMBLES` independent scrambles: each so
-many that one in 1,000 is larger, where weights are bounded. Points come from `SEED`, so results are repeatable.
+many that one in 1,000 is larger, where weights are bounded. To that, both add what no point has met: of all directions
+that samples take, a share of `UNMET` by the number of points is missed by all of them once in 1,000 times, and may
+weigh as much as the largest weight that was found. Points come from `SEED`, so results are repeatable.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -21,6 +24,7 @@ SEED = 20100629
 FIRST, MOST = 2**10, 2**20  # points
 SCRAMBLES = 16
 SURE_RANDOM, SURE_SCRAMBLED = 3.29, 4.07  # of a normal and of Student's distribution with 15 degrees of freedom
+UNMET = math.log(1000)
 BLOCK = 2**16  # directions at a time
 
 
@@ -93,18 +97,22 @@ def _of_rows(form: Form, values: Mapping[str, Tensor], rows: Rows, points: Tenso
     sine = torch.sqrt((1 - rows.co) * (1 + rows.co))
     wo = torch.stack([sine * torch.cos(rows.azimuth), sine * torch.sin(rows.azimuth), rows.co], -1)[:, None, None]
     placed = {name: value.detach() for name, value in values.items()}
-    sums, squares = [], []
+    sums, squares, largest = [], [], []
     for block in points.split(max(1, BLOCK // (len(rows.co) * points.shape[1])), dim=0):
         with torch.no_grad():
             u = block.expand(len(rows.co), *block.shape)
             wi = form.sample(placed, wo.expand_as(u), u)
             density = form.pdf(placed, geometry(wi, wo, form.pdf_needs))[..., None]
             factor = torch.where(density > 0, wi[..., 2:] / torch.where(density > 0, density, 1.0), 0.0)
-        weights = form.f(values, geometry(wi, wo, form.needs)) * factor.clamp(min=0)
+        factor = factor.clamp(min=0)
+        weights = torch.where(factor > 0, form.f(values, geometry(wi, wo, form.needs)), 0.0) * factor
         group = weights.mean(2)
         sums.append(group.sum(1))
         squares.append(group.detach().square().sum(1))
+        largest.append(weights.detach().amax((1, 2)))
     groups = points.shape[0]
     mean = torch.stack(sums).sum(0) / groups
     variance = (torch.stack(squares).sum(0) / groups - mean.detach().square()).clamp(min=0) / (groups - 1)
-    return mean, (SURE_SCRAMBLED if groups == SCRAMBLES else SURE_RANDOM) * torch.sqrt(variance)
+    sure = SURE_SCRAMBLED if groups == SCRAMBLES else SURE_RANDOM
+    unmet = UNMET / (groups * points.shape[1]) * torch.stack(largest).amax(0)
+    return mean, (sure * torch.sqrt(variance) + unmet).nan_to_num(nan=math.inf, posinf=math.inf)

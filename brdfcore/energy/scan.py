@@ -21,6 +21,7 @@ from .probe import Symmetry, growth, symmetry
 
 LOW, LOWEST = 1e-10, 1e-12  # the cosines of the last two rows, which tell what happens towards grazing
 STEP_U, STEPS_S = 0.6, 12  # a step of u, and how many of s make a quarter turn
+FIRST = (0.0, 0.03, 0.08, 0.16, 0.3)  # near the normal a kink at ci = co acts over the width of the lobe
 STEEP, STEP_STEEP = 14.0, 3.0  # beyond this u, where cos theta = 2e-6, larger steps will do
 QUARTER = 11.4  # s of the y axis: tan phi starts from exp(-QUARTER) = 1e-5, the smallest ratio of two widths
 LOOSE = 1e-4  # tolerance of the two rows that tell an exponent
@@ -75,8 +76,8 @@ class Scan:
         self.mirrored = all(term.symmetry.mirrored for term in terms)
         self.turn = 0.0 if isotropic else QUARTER if self.mirrored else 4 * QUARTER
         last = [math.acosh(1 / cosine) for cosine in (LOW, LOWEST)]
-        rows = [STEP_U / 2, 1.5 * STEP_U, *np.arange(0, STEEP, STEP_U), *np.arange(STEEP, last[0], STEP_STEEP), *last]
-        self.u = torch.tensor(sorted(rows), dtype=torch.float64)
+        rows = [*FIRST, *np.arange(STEP_U, STEEP, STEP_U), *np.arange(STEEP, last[0], STEP_STEEP), *last]
+        self.u = torch.tensor(rows, dtype=torch.float64)
         self.s = torch.linspace(0, self.turn, 1 + round(self.turn / QUARTER) * STEPS_S, dtype=torch.float64)
         self.evaluations = 0
 

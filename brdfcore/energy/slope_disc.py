@@ -26,31 +26,49 @@ from ..models import Model
 from ..parameters import Values
 from .grading import Circle, Rays
 from .lobes import PROFILES, anisotropic, slope_widths
-from .refinement import Integral, Rows, Sums, take
+from .refinement import NODES, Integral, Rows, Sums, take
 from .rules import LADDER, Rule, Tail, gauss
+
+NARROW = 0.05  # a width below which nodes are drawn to a layer at the horizon
+NEGLIGIBLE_LAYER = 10.0  # times the error that may be neglected
+
+
+class _Segments(NamedTuple):
+    """Segments of rays on which a lobe is smooth, and which are not empty."""
+
+    row: Tensor  # (S,)
+    ray: Tensor  # (S,)
+    piece: Tensor  # (S,) which of the ray's pieces it is
+    low: Tensor  # (S, 1) the slopes between which it lies
+    high: Tensor  # (S, 1)
+    end: Tensor  # (S, 1) R
+    cut: Tensor  # (S, 1) whether it goes to the horizon
+    s: Tensor  # (S, 1) T cos phi
+    width: Tensor  # (S, 1) of the lobe
+    weight: Tensor  # (S, 1) of the ray
+
+    def part(self, some: slice) -> "_Segments":
+        """Some of them."""
+        return _Segments(*(v[some] for v in self))
 
 
 class _Nodes(NamedTuple):
-    """Nodes (S, n) on the S segments of rays that are not empty."""
+    """Nodes (S, n) on segments."""
 
-    row: Tensor  # (S,) of the segment
-    ray: Tensor  # (S,)
-    piece: Tensor  # (S,)
     r: Tensor  # slope
     rest: Tensor  # R - r
     weight: Tensor  # dr dphi, and of the rules
-    end: Tensor  # R, (S, 1)
 
 
 class SlopeDisc(Integral):
     """The integrals over the disc for a lobe with a profile."""
 
-    last = (LADDER.index(2048), LADDER.index(320))
-
     def __init__(self, model: Model, place: Values, rows: Rows, error: float) -> None:
         super().__init__(model, place, rows, error)
         self.profile = PROFILES[model.name]
         self.two = anisotropic(model)
+        # Beckmann's masking is smooth, but not analytic, at wi = n: that takes many nodes
+        self.last = LADDER.index(2048), LADDER.index(320 if self.profile.fall == "algebraic" else 768)
         self.pieces = {"none": 1, "equal": 2, "grooves": 3}[self.profile.kink]  # into which kinks part a ray
         with torch.no_grad():
             self.circle = Circle(self.profile, rows, slope_widths(model, self.place), self.two, error)
@@ -62,7 +80,7 @@ class SlopeDisc(Integral):
         if profile.kink == "none":
             rays = (12 if self.two else 4) * share + 22 * share**1.3 * ((steepness - 0.7) / 2.3).clamp(0, 1)
         else:
-            rays = share * (5 + self.circle.fine.squeeze(1) + 8 * ((steepness - 0.3) / 3).clamp(0, 1))
+            rays = share * (5.5 + 1.1 * self.circle.fine.squeeze(1) + 9 * ((steepness - 0.3) / 3).clamp(0, 1))
         inner = 3.0 if profile.fall == "algebraic" else 2.3 if profile.start else 1.8
         return rays, inner * digits
 
@@ -78,26 +96,29 @@ class SlopeDisc(Integral):
         with torch.no_grad():
             rays = self.circle.rays(chosen, outer)
             rule = gauss(inner).to(rows.co.device)
-            nodes, whole = self._nodes(rays, rule)
-            geometry, weight = _geometry(self.model, rows, rays, nodes)
-            own_rows = nodes.row
-        bases = self.model.basis({name: value[:, None] for name, value in take(own, own_rows).items()}, geometry)
-        parts = torch.stack([basis * weight for basis in torch.broadcast_tensors(*bases)], dim=1)  # (S, K, n, C)
-        count, rays_count = rays.s.shape
-        at = nodes.row * rays_count + nodes.ray
-        shape = (parts.shape[1], parts.shape[3])
-        along = parts.new_zeros(count * rays_count, *shape).index_add(0, at, parts.sum(2))
-        along = along.unflatten(0, (count, rays_count))  # (R, M, K, C)
-        with torch.no_grad():
-            detached = parts.detach()
-            scale = detached.new_zeros(count, *shape).index_add(0, nodes.row, detached.abs().sum(2))
-            across = detached.new_zeros(count * self.pieces, *detached.shape[1:])
-            across.index_add_(0, nodes.row * self.pieces + nodes.piece, detached)
-            across = across.unflatten(0, (count, self.pieces)).transpose(1, 2)  # (R, K, P, n, C)
-            around = along.detach().permute(0, 2, 1, 3).unflatten(2, (rays.panels, -1))
-            first, second = (_over_pieces(r.tail(p)) for r, p in ((rays.rule, around), (rule, across)))
+            segments, whole = self._segments(rays)
+        count, around = rays.s.shape
+        along, across, scale = [], rows.co.new_zeros(0), rows.co.new_zeros(0)
+        for start in range(0, len(segments.row), NODES // inner):
+            some = segments.part(slice(start, start + NODES // inner))
+            with torch.no_grad():
+                geometry, weight = _geometry(self.model, rows, rays, some, self._nodes(some, rule))
+            bases = self.model.basis({k: v[:, None] for k, v in take(own, some.row).items()}, geometry)
+            parts = torch.stack([basis * weight for basis in torch.broadcast_tensors(*bases)], dim=1)  # (S, K, n, C)
+            along.append(parts.sum(2))
+            parts = parts.detach()
+            if start == 0:
+                across = parts.new_zeros(count * self.pieces, *parts.shape[1:])
+                scale = parts.new_zeros(count, *along[0].shape[1:])
+            across.index_add_(0, some.row * self.pieces + some.piece, parts)
+            scale.index_add_(0, some.row, parts.abs().sum(2))
+        of_ray = scale.new_zeros(count * around, *scale.shape[1:])
+        of_ray = of_ray.index_add(0, segments.row * around + segments.ray, torch.cat(along))
+        of_ray = of_ray.unflatten(0, (count, around))  # (R, M, K, C)
+        outer_tail = rays.rule.tail(of_ray.detach().permute(0, 2, 1, 3).unflatten(2, (rays.panels, -1)))
+        inner_tail = rule.tail(across.unflatten(0, (count, self.pieces)).transpose(1, 2))
         neglected = torch.where(whole, 0.0, 10 * self.error)[:, None, None]
-        return Sums(along.sum(1), scale, first, second, neglected)
+        return Sums(of_ray.sum(1), scale, _over_pieces(outer_tail), _over_pieces(inner_tail), neglected)
 
     def _reach(self, width: Tensor) -> Tensor:
         """The slope beyond which the lobe is negligible."""
@@ -120,9 +141,9 @@ class SlopeDisc(Integral):
             return [first, torch.where(shallow, end, s)]
         return []
 
-    def _nodes(self, rays: Rays, rule: Rule) -> tuple[_Nodes, Tensor]:
-        """The nodes, and whether those of each row fill the disc, (R,)."""
-        s, profile = rays.s, self.profile
+    def _segments(self, rays: Rays) -> tuple[_Segments, Tensor]:
+        """The segments of the rays, and whether those of each row fill the disc, (R,)."""
+        s = rays.s
         hypotenuse = torch.sqrt(1 + s.square())
         end = torch.where(s > 0, s.clamp(min=0) + hypotenuse, 1 / (hypotenuse - s.clamp(max=0)))
         reach = self._reach(rays.width)
@@ -131,27 +152,34 @@ class SlopeDisc(Integral):
         low, high = edges[..., :-1], edges[..., 1:]
         row, ray, piece = torch.nonzero(high > low, as_tuple=True)
         at = row, ray
-        low, high, end_, s_, cut_ = (v[..., None] for v in (low[*at, piece], high[*at, piece], end[at], s[at], cut[at]))
-        steepness = torch.ones_like(s_)
-        if profile.fall == "algebraic":
-            steepness = torch.sqrt(1 + rays.width[at][:, None].reciprocal().square())
+        last = piece == self.pieces - 1
+        numbers = (low[*at, piece], high[*at, piece], end[at], cut[at] & last, s[at], rays.width[at], rays.weight[at])
+        return _Segments(row, ray, piece, *(v[:, None] for v in numbers)), cut.all(1)
+
+    def _nodes(self, segments: _Segments, rule: Rule) -> _Nodes:
+        """The nodes on segments."""
         m, rest, slope = rule.nodes, rule.rest, rule.weights
-        if profile.end > 1:
-            cut_ = cut_ & (piece == self.pieces - 1)[:, None]
-            m = torch.where(cut_, 1 - rest**profile.end, m)
-            slope = torch.where(cut_, profile.end * rest ** (profile.end - 1), 1.0) * slope
-            rest = torch.where(cut_, rest**profile.end, rest)
-        low_u, high_u = torch.asinh(low * steepness), torch.asinh(high * steepness)
-        span = high_u - low_u
-        if profile.start:  # u is quadratic in m, from where the feature is below it
-            e = torch.sqrt(steepness / (s_.clamp(min=1e-30) * span)).clamp(max=1e8)
+        power, cut = self.profile.end, segments.cut
+        if self.profile.layer:  # where it is narrow and matters
+            cut = cut & (segments.width < NARROW) & (segments.width**3 > NEGLIGIBLE_LAYER * self.error)
+        if power > 1:
+            m = torch.where(cut, 1 - rest**power, m)
+            slope = torch.where(cut, power * rest ** (power - 1), 1.0) * slope
+            rest = torch.where(cut, rest**power, rest)
+        steepness = torch.ones_like(segments.s)
+        if self.profile.fall == "algebraic":
+            steepness = torch.sqrt(1 + segments.width.reciprocal().square())
+        low, high = torch.asinh(segments.low * steepness), torch.asinh(segments.high * steepness)
+        span, over = high - low, 1 / steepness
+        if self.profile.start:  # u is quadratic in m, from where the feature is below it
+            e = torch.sqrt(steepness / (segments.s.clamp(min=1e-30) * span)).clamp(max=1e8)
             scale = 1 / (1 + 2 * e)
             slope = slope * (2 * scale * (e + m))
             m, rest = m * (2 * e + m) * scale, rest * (1 + 2 * e + m) * scale
-        u, over = low_u + span * m, 1 / steepness
-        left = (2 * over) * torch.cosh(0.5 * (high_u + u)) * torch.sinh((0.5 * span) * rest)
-        weight = torch.cosh(u) * slope * (over * span * rays.weight[at][:, None])
-        return _Nodes(row, ray, piece, torch.sinh(u) * over, (end_ - high) + left, weight, end_), cut.all(1)
+        u = low + span * m
+        left = (2 * over) * torch.cosh(0.5 * (high + u)) * torch.sinh((0.5 * span) * rest)
+        weight = torch.cosh(u) * slope * (over * span * segments.weight)
+        return _Nodes(torch.sinh(u) * over, (segments.end - segments.high) + left, weight)
 
 
 def _over_pieces(tail: Tail) -> Tail:
@@ -159,11 +187,11 @@ def _over_pieces(tail: Tail) -> Tail:
     return tail._replace(early=tail.early.sum(2), late=tail.late.sum(2))
 
 
-def _geometry(model: Model, rows: Rows, rays: Rays, nodes: _Nodes) -> tuple[Geometry, Tensor]:
+def _geometry(model: Model, rows: Rows, rays: Rays, segments: _Segments, nodes: _Nodes) -> tuple[Geometry, Tensor]:
     """What the model reads at the nodes, and cos theta_i dwi there, each (S, n, 1)."""
-    at = nodes.row, nodes.ray
-    x, y, co = (v[:, None, None] for v in (rays.x[at], rays.y[at], rows.co[nodes.row]))
-    r, rest, weight, end = (v[..., None] for v in (nodes.r, nodes.rest, nodes.weight, nodes.end))
+    at = segments.row, segments.ray
+    x, y, co = (v[:, None, None] for v in (rays.x[at], rays.y[at], rows.co[segments.row]))
+    r, rest, weight, end = (v[..., None] for v in (*nodes, segments.end))
     e2 = r.square()
     hz2 = 1 / (1 + e2)
     hz = torch.sqrt(hz2)
@@ -173,7 +201,7 @@ def _geometry(model: Model, rows: Rows, rays: Rays, nodes: _Nodes) -> tuple[Geom
     h_dot_wo = (co * (0.5 + rest * (0.5 * over_end) + r * (0.5 * end)) * hz).clamp(min=floor)
 
     def of_wo(turn: Tensor) -> Tensor:
-        return (torch.sqrt((1 - rows.co) * (1 + rows.co)) * turn)[nodes.row, None, None]
+        return (torch.sqrt((1 - rows.co) * (1 + rows.co)) * turn)[segments.row, None, None]
 
     quantities = {
         "ci": lambda: ci,

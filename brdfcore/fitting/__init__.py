@@ -1,11 +1,28 @@
 """Fits of materials to measured samples."""
 
 from ._fit import Progress, fit
+from .asked import check
 from .batch import fit_batch
 from .losses import LOSSES
-from .plan import OPTIMIZERS, check
+from .plan import OPTIMIZERS
 from .result import Cost, Fit
 from .robust import ROBUST
+from .rung import Rung
+from .support import Support, supports
 from .worth import errors
 
-__all__ = ["LOSSES", "OPTIMIZERS", "ROBUST", "Cost", "Fit", "Progress", "check", "errors", "fit", "fit_batch"]
+__all__ = [
+    "LOSSES",
+    "OPTIMIZERS",
+    "ROBUST",
+    "Cost",
+    "Fit",
+    "Progress",
+    "Rung",
+    "Support",
+    "check",
+    "errors",
+    "fit",
+    "fit_batch",
+    "supports",
+]

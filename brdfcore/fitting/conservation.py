@@ -11,7 +11,8 @@ solves the Gauss-Newton model of the loss under the albedos' linear ones, which 
 
 by its dual, and is kept if loss + weight times excess falls. A shape for which the albedo has no limit towards grazing
 is fixed first where it has one (the power `alpha` of Kurt's lobe at 0); where no shape has one (Ward's), the
-reflectance is 0. The optimum is the one that the free fit's leads to: others may exist.
+reflectance is 0. Intervals are those along the limits that hold. The optimum is the one that the free fit's leads to:
+others may exist.
 """
 
 import math
@@ -40,6 +41,7 @@ TOLERANCE = 1e-8  # of the albedos
 LOWEST = 1e-12  # cosine that stands for the limit towards grazing
 CLOSE = 0.9  # albedos below this are not about to reach 1 in a step
 ROUNDS, STEPS = 20, 100
+STIFF = 1e4  # times as curved as the loss is along a limit's normal, so that no interval reaches across
 GAIN = 1e-10  # of the loss: a step that promises less ends the search
 HARDEST = 1e12  # damping beyond which a step no longer changes x
 
@@ -149,8 +151,9 @@ def _grows(term: Term, own: dict[str, Tensor]) -> bool:
 def _held(found: Found, directions: Tensor) -> Found:
     """The optimum from here under albedos of at most 1 at the directions (J, 2), cosine and azimuth, by one search."""
     problem = found.problem
-    x, steps, converged = _descent(problem, found.outcome.x[0], directions)
+    x, normals, steps, converged = _descent(problem, found.outcome.x[0], directions)
     gram = problem.gram(x.unsqueeze(0))
+    gram = gram._replace(matrix=gram.matrix + _stiff(gram.matrix[0], normals))
     outcome = Outcome(x.unsqueeze(0), gram.loss, torch.tensor([converged]), steps, gram)
     return replace(
         found,
@@ -160,8 +163,15 @@ def _held(found: Found, directions: Tensor) -> Found:
     )
 
 
-def _descent(problem: Problem, x: Tensor, directions: Tensor) -> tuple[Tensor, int, bool]:
-    """The constrained optimum that x (D,) leads to, the steps it took, and whether it was reached."""
+def _stiff(matrix: Tensor, normals: Tensor) -> Tensor:
+    """What makes moves along the normals (A, D) of active limits all but impossible: intervals know of the limits."""
+    square = normals.square().sum(-1).clamp(min=1e-300)
+    curvature = ((normals @ matrix) * normals).sum(-1) / square
+    return (normals.T * (STIFF * curvature / square)) @ normals
+
+
+def _descent(problem: Problem, x: Tensor, directions: Tensor) -> tuple[Tensor, Tensor, int, bool]:
+    """The constrained optimum that x (D,) leads to, the slopes of active limits there, the steps, whether reached."""
     here = _model(problem, x, directions)
     damping, growth, price = 1e-3, 2.0, 0.0
     for steps in range(1, STEPS + 1):
@@ -169,7 +179,7 @@ def _descent(problem: Problem, x: Tensor, directions: Tensor) -> tuple[Tensor, i
         price = max(price, 2 * float(prices.max()))
         promised = here.fall(step) + price * (here.above() - here.above(step))
         if promised <= GAIN * here.loss and here.above() <= MARGIN:
-            return x, steps, True
+            return x, here.slopes[prices > 0], steps, True
         trial = x + step
         there = _model(problem, trial, directions)
         gained = here.loss - there.loss + price * (here.above() - there.above())
@@ -180,8 +190,8 @@ def _descent(problem: Problem, x: Tensor, directions: Tensor) -> tuple[Tensor, i
         else:
             damping, growth = damping * growth, 2 * growth
             if damping > HARDEST:
-                return x, steps, here.above() <= MARGIN
-    return x, STEPS, False
+                return x, here.slopes[prices > 0], steps, here.above() <= MARGIN
+    return x, here.slopes[prices > 0], STEPS, False
 
 
 class _Model(NamedTuple):

@@ -11,6 +11,7 @@ from ..errors import ModelTextError, ParameterError, unknown_name
 from ..models.form import Form, build
 from ..models.text import ParsedTerm, Tie, parse
 from ..parameters import Parameter
+from .effects import AUTO
 from .limits import check_max_theta, check_robust, checked_bounds
 from .losses import LOSSES
 
@@ -148,6 +149,8 @@ def _start(
 def _held_isotropic(form: Form, parsed: Sequence[ParsedTerm]) -> Iterator[str]:
     """A sentence for each term that another of its words, and nothing else, keeps from being anisotropic."""
     for term, written in zip(form.terms, parsed, strict=True):
+        if "anisotropic" in term.model.options:
+            continue
         for pair in term.model.apart:
             rest = [word for word in written.words if word not in pair]
             others = type(term.model).with_words(rest, tuple(written.arguments))
@@ -214,6 +217,11 @@ def check(
     if not isinstance(model, str):
         raise ModelTextError(
             f"Expected model to be a text, got {type(model).__name__}. Write it like 'lambert + ward'.", field="model"
+        )
+    if model == AUTO:
+        raise ModelTextError(
+            f'Expected model to be one text here, got "{AUTO}", which chooses among several. Use bc.fit for that.',
+            field="model",
         )
     if loss not in LOSSES:
         raise unknown_name("a loss", loss, LOSSES, field="loss")

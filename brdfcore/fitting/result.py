@@ -5,12 +5,20 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import torch
 from torch import Tensor
 
 from ..energy.certificate import Certificate, certify
 from ..formats.samples import Samples
 from ..models.form import Form
 from ..models.material import Material
+from .plan import Plan
+from .rung import Rung, table
+
+STATUSES = ("converged", "undetermined", "stopped_early")
+_MOST = 32  # values whose covariances JSON holds; those of more are in `Fit.covariance` alone
+_STRONG = 0.95  # correlations that the report names
+_NAMED = 6  # of them, the strongest
 
 
 @dataclass(frozen=True)
@@ -39,13 +47,23 @@ class Conservation:
 class Fit:
     """What `bc.fit` returns.
 
-    form, values, samples: what was fitted, the best values, stored parameters only, and to what.
+    plan, form, values, samples: what was asked, fitted, the best values, stored parameters only, and to what.
     parameters, standard_errors: key -> () or (C,); intervals: key -> (2,) or (C, 2), 95 %. NaN stands where there is no
     number to give: in an interval for a value that was fixed or lies on an end of its box, and everywhere for one
     that the data leave undetermined. `objective` is the loss that was minimised: chi-square where the samples' sigma
-    weighed it, else the error of that name. `status` is "converged" or "stopped_early", `message` says more.
+    weighed it, else the error of that name.
+
+    status              "converged"; "undetermined", converged but with values that the data leave free; or
+                        "stopped_early". `message` says more
+    undetermined        what the data leave free: key, or key[channel], or "key with key" for values that only their
+                        combination determines (identifiability.py says from where on)
+    combinations        for each of those, how its values change together: name -> change, of length 1, natural units
+    singular_values     of the Jacobian with its columns scaled to length 1, falling; all values but those on an end
+    covariance          (K, K), natural units, of the values in `covariance_keys`: all that have a standard error
+    warnings            what the data's directions and values cannot show of this model, a sentence each (support.py)
     """
 
+    plan: Plan
     form: Form
     values: dict[str, Tensor]
     samples: Samples
@@ -58,6 +76,11 @@ class Fit:
     status: str
     message: str
     undetermined: tuple[str, ...]
+    combinations: tuple[dict[str, float], ...]
+    singular_values: tuple[float, ...]
+    covariance: Tensor
+    covariance_keys: tuple[str, ...]
+    warnings: tuple[str, ...]
     choices: tuple[str, ...]
     fixed: tuple[str, ...]
     gray: tuple[str, ...]
@@ -67,6 +90,7 @@ class Fit:
     channels: tuple[str, ...]
     provenance: dict[str, str | int]
     conservation: Conservation | None = None  # where `conserve_energy` was asked for
+    ladder: tuple[Rung, ...] = ()  # the materials that were tried, where the fit chose among several
 
     @cached_property
     def material(self) -> Material:
@@ -83,12 +107,20 @@ class Fit:
         """The model that was fitted, its options decided, without values."""
         return self.form.text()
 
+    @property
+    def correlations(self) -> Tensor:
+        """The correlations (K, K) [1] of the values in `covariance_keys`; 0 beside a value without any error."""
+        error = self.covariance.diagonal().sqrt()
+        scale = torch.where(error > 0, 1 / torch.where(error > 0, error, 1.0), 0.0)
+        found = (self.covariance * scale * scale.unsqueeze(-1)).clamp(-1, 1)
+        return found.fill_diagonal_(1.0)
+
     def units(self) -> dict[str, str]:
         """What each parameter is, with its unit."""
         return {key: parameter.description for key, parameter in self.form.all_parameters.items()}
 
     def to_dict(self) -> dict[str, Any]:
-        """The result as JSON-able data, null where there is no number."""
+        """The result as JSON-able data, null where there is no number, and for covariances of more than 32 values."""
         result = {
             "model": self.model,
             "material_text": str(self.material),
@@ -103,6 +135,12 @@ class Fit:
             "units": self.units(),
             "errors": {key: _number(value) for key, value in self.errors.items()},
             "undetermined": list(self.undetermined),
+            "combinations": [dict(one) for one in self.combinations],
+            "singular_values": list(self.singular_values),
+            "covariance_keys": list(self.covariance_keys),
+            "covariance": self._matrix(self.covariance),
+            "correlations": self._matrix(self.correlations),
+            "warnings": list(self.warnings),
             "choices": list(self.choices),
             "fixed": list(self.fixed),
             "gray": list(self.gray),
@@ -114,15 +152,28 @@ class Fit:
             "channels": list(self.channels),
             "data": self.samples.report(),
             "provenance": dict(self.provenance),
+            "ladder": [rung.to_dict() for rung in self.ladder],
         }
-        return {**result, "report": _report(result)}
+        return {**result, "report": _report(result, self._strong())}
+
+    def _matrix(self, matrix: Tensor) -> list[list[float]] | None:
+        return matrix.tolist() if 0 < len(matrix) <= _MOST else None
+
+    def _strong(self) -> list[str]:
+        """The pairs of values that are strongly correlated, the strongest first, in words."""
+        upper = self.correlations.triu(1)
+        pairs = (upper.abs() > _STRONG).nonzero().tolist()
+        pairs.sort(key=lambda pair: -abs(float(upper[*pair])))
+        keys = self.covariance_keys
+        words = [f"{keys[i]} and {keys[j]} ({float(upper[i, j]):.3f})" for i, j in pairs[:_NAMED]]
+        return words + [f"{len(pairs) - _NAMED} more"] * (len(pairs) > _NAMED)
 
     def report(self) -> str:
         """The result as plain text, one line a value."""
         return str(self.to_dict()["report"])
 
 
-def _report(result: dict[str, Any]) -> str:
+def _report(result: dict[str, Any], correlated: list[str]) -> str:
     lines = [result["model"], f"{result['status'].replace('_', ' ')}: {result['message']}", ""]
     lines.append(f"{'parameter':<32}{'value':>12}  {'95 % interval':<27}what it is")
     for key, value in result["parameters"].items():
@@ -140,7 +191,13 @@ def _report(result: dict[str, Any]) -> str:
         lines.append("chi-square {:.6g} for {} degrees of freedom".format(*result["chi_square"]))
     if result["undetermined"]:
         lines.append("not determined by the data: " + ", ".join(result["undetermined"]))
+        singular = result["singular_values"]
+        lines.append(f"singular values of the scaled Jacobian: {singular[0]:.3g} down to {singular[-1]:.3g}")
+    if correlated:
+        lines.append("strongly correlated: " + ", ".join(correlated))
+    lines += [f"note: {sentence}" for sentence in result["warnings"]]
     lines.append(result["certificate"]["verdict"])
+    lines += table(result["ladder"])
     lines += result["choices"]
     lines += [f"left out: {m['count']} samples, {m['reason']}" for m in result["data"].get("masked", [])]
     cost, made = result["cost"], result["provenance"]

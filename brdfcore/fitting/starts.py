@@ -5,6 +5,8 @@ lowest loss become starts: that of the projection, and the fit's own where it is
 directions share the scan.
 """
 
+import math
+
 import torch
 from torch import Tensor
 
@@ -13,6 +15,7 @@ from .projection import Projection
 
 _POINTS = 32  # of a scan for each shape of a lone lobe
 _MANY_POINTS = 256  # where there are more, or two lobes, whose optima are many
+_BEYOND = 0.25  # of the points: so many more over the whole box, since a width may lie outside the range of the rest
 _AT_ONCE = 64  # points: the products of that many stay small
 
 
@@ -45,13 +48,18 @@ def _points(problem: Problem, projection: Projection, seed: int) -> Tensor:
     own = problem.pack(problem.plan.start)
     shapes = [problem.keys[p] for p in projection.shapes]
     count = _MANY_POINTS if several_lobes(projection) else min(_POINTS * len(shapes), _MANY_POINTS)
-    points = own.repeat(count + 1, 1) if shapes else own.unsqueeze(0)  # the text's own shapes are the last point
+    more = math.ceil(_BEYOND * count)
+    points = own.repeat(count + more + 1, 1) if shapes else own.unsqueeze(0)  # the text's own shapes are the last point
     if shapes:
-        unit = torch.quasirandom.SobolEngine(len(shapes), scramble=True, seed=seed).draw(count, dtype=torch.float64)
+        unit = torch.quasirandom.SobolEngine(len(shapes), scramble=True, seed=seed).draw(
+            count + more, dtype=torch.float64
+        )
         for column, key in enumerate(shapes):
-            parameter = problem.plan.form.parameters[key]
+            parameter, at = problem.plan.form.parameters[key], problem.slices[key]
             low, high = parameter.to_raw(torch.tensor(problem.plan.search_range(key), dtype=torch.float64))
-            points[:count, problem.slices[key]] = (low + (high - low) * unit[:, column]).unsqueeze(-1)
+            points[:count, at] = (low + (high - low) * unit[:count, column]).unsqueeze(-1)
+            least, most = problem.low[at], problem.high[at]
+            points[count : count + more, at] = least + (most - least) * unit[count:, column].unsqueeze(-1)
     return points.clamp(problem.low, problem.high)
 
 

@@ -10,10 +10,12 @@ from .. import __version__
 from ..formats.samples import Samples
 from ..models.material import Material
 from .data import Data, stacked_weights
+from .identifiability import name_of, named
 from .levenberg_marquardt import Outcome
 from .losses import LOSSES
 from .problem import Problem
 from .result import Cost, Fit
+from .support import supports, warnings
 from .uncertainty import Uncertainty, uncertainty
 
 
@@ -26,18 +28,22 @@ def fits(
     known = uncertainty(problem, x, outcome.gram)
     f = torch.cat([problem.f(x, piece) for piece in problem.data.chunks(len(x))], dim=-1)  # (M, C, N)
     values = {key: value.squeeze(1).expand(len(x), -1) for key, value in _rows(problem, x).items()}
-    described = _described(problem, values, known, channels)
+    described = _described(problem, values, known)
     every_error = _errors(f, problem.data, fitted)
     chi_square: list[float] | None = None
     if problem.data.sigma is not None:
         chi_square = ((f - problem.data.y) / problem.data.sigma).square().sum((1, 2)).tolist()
     freedom, minima, ends = known.freedom.tolist(), outcome.loss.tolist(), outcome.converged.tolist()
+    support = supports(fitted[0])
     found = []
     for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
         error = every_error[row]
-        parameters, standard_errors, intervals, undetermined = described[row]
+        parameters, standard_errors, intervals = described[row]
+        undetermined, combinations = named(problem, known.unseen[row], known.chain[row], channels)
+        certain = known.covariance[row].diagonal().isfinite()
         found.append(
             Fit(
+                plan=plan,
                 form=plan.form,
                 values={key: value[row].reshape(plan.start[key].shape) for key, value in values.items()},
                 samples=samples,
@@ -45,11 +51,16 @@ def fits(
                 standard_errors=standard_errors,
                 intervals=intervals,
                 undetermined=undetermined,
+                combinations=combinations,
+                singular_values=known.singular_values[row],
+                covariance=known.covariance[row][certain][:, certain],
+                covariance_keys=tuple(name_of(problem, at, channels) for at in certain.nonzero()[:, 0].tolist()),
                 errors=error,
                 loss=problem.loss_kind.name,
                 objective=minima[row] if weighed or plan.robust else error[problem.loss_kind.name],
-                status="converged" if ends[row] else "stopped_early",
-                message=_message(problem, known, row, converged=ends[row], several=len(channels) > 1, weighed=weighed),
+                status=("undetermined" if undetermined else "converged") if ends[row] else "stopped_early",
+                message=_message(problem, known, row, undetermined, converged=ends[row], weighed=weighed),
+                warnings=warnings(plan, support, samples, problem.loss_kind.name),
                 choices=plan.choices,
                 fixed=tuple(sorted(plan.fixed)),
                 gray=tuple(sorted(plan.gray)),
@@ -91,16 +102,14 @@ def _errors(f: Tensor, data: Data, samples: Sequence[Samples]) -> list[dict[str,
     return [{name: each[row] for name, each in found.items()} for row in range(len(f))]
 
 
-Described = tuple[dict[str, Tensor], dict[str, Tensor], dict[str, Tensor], tuple[str, ...]]
+Described = tuple[dict[str, Tensor], dict[str, Tensor], dict[str, Tensor]]
 
 
-def _described(
-    problem: Problem, values: dict[str, Tensor], known: Uncertainty, channels: tuple[str, ...]
-) -> list[Described]:
-    """Values, standard errors and intervals by key, tied parameters included, and what is undetermined, by material."""
+def _described(problem: Problem, values: dict[str, Tensor], known: Uncertainty) -> list[Described]:
+    """Values, standard errors and intervals by key, tied parameters included, by material."""
     form, start = problem.plan.form, problem.plan.start
     materials = len(known.freedom)
-    found: list[Described] = [({}, {}, {}, ()) for _ in range(materials)]
+    found: list[Described] = [({}, {}, {}) for _ in range(materials)]
     for key in form.all_parameters:
         tie = form.ties.get(key)
         owner = key if tie is None else tie.owner
@@ -118,18 +127,16 @@ def _described(
                 low, high = total - high, total - low
             value = torch.where(blind, math.nan, value)
         columns = (value, error, torch.stack([low, high], dim=-1))
-        each = zip(*(c[:, 0] if one else c for c in columns), blind.any(-1).tolist(), strict=True)
-        for row, (value_, error_, interval, some) in enumerate(each):
-            parameters, standard_errors, intervals, undetermined = found[row]
+        each = zip(*(c[:, 0] if one else c for c in columns), strict=True)
+        for row, (value_, error_, interval) in enumerate(each):
+            parameters, standard_errors, intervals = found[row]
             parameters[key], standard_errors[key], intervals[key] = value_, error_, interval
-            if some and tie is None:
-                names = [f"{key}[{channels[int(c)]}]" for c in blind[row].nonzero()]
-                names = [key] if bool(blind[row].all()) else names
-                found[row] = parameters, standard_errors, intervals, (*undetermined, *names)
     return found
 
 
-def _message(problem: Problem, known: Uncertainty, row: int, *, converged: bool, several: bool, weighed: bool) -> str:
+def _message(
+    problem: Problem, known: Uncertainty, row: int, undetermined: Sequence[str], *, converged: bool, weighed: bool
+) -> str:
     """What the user must know of a result, in sentences."""
     if not problem.size:
         parts = ["Every value is fixed, so this is an evaluation."]
@@ -139,14 +146,25 @@ def _message(problem: Problem, known: Uncertainty, row: int, *, converged: bool,
         parts = [
             "The optimizer stopped before the optimum; treat values and intervals with care, or use least_squares."
         ]
-    held, blind = known.held[row].tolist(), known.undetermined[row].tolist()
+    held = known.held[row].tolist()
     on_end = [key for key, at in problem.slices.items() if any(held[at])]
     if on_end:
-        where = " in some channel" if several else ""
+        where = " in some channel" if problem.channels > 1 else ""
         parts.append(f"{', '.join(on_end)} ended on an end of the box{where}, so no interval is given there.")
-    if any(blind):
-        unseen = [key for key, at in problem.slices.items() if any(blind[at])]
-        parts.append(f"The data do not determine {', '.join(unseen)}; no number is given for what they leave free.")
+    together = [words for words in undetermined if " with " in words]
+    alone = [words for words in undetermined if words not in together]
+    if alone:
+        parts.append(f"The data do not determine {', '.join(alone)}; no number is given for what they leave free.")
+    if together:
+        parts.append(
+            f"The data do not determine {', nor '.join(together)} one by one, only together; no number is given for "
+            "any of them. Fix one of them, or measure where their effects differ."
+        )
+    vague = [key for key, at in problem.slices.items() if bool(known.vague[row, at].any())]
+    if vague:
+        parts.append(
+            f"Few samples decide {', '.join(vague)}, so an interval there is as long as the range that is searched."
+        )
     if problem.data.sigma is None and int(known.freedom[row]) <= 0:
         parts.append("There are no more samples than values, so no interval can be given.")
     if weighed:

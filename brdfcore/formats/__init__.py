@@ -3,21 +3,28 @@
 A format's file holds one `Format`; listing it in FORMATS is all that the reader, the command line and the service need.
 """
 
+import stat
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Final
 
 from ..errors import FormatError, unknown_name
-from . import cornell, delimited, merl, npz
+from . import alta, arrow, astm, cornell, curet, delimited, merl, nist, npy, npz, parquet, rgl
 from ._format import Format
+from ._text import number
 from .delimited import write_csv
 from .samples import ANGLE_UNITS, QUANTITIES, Masked, Samples
 
 __all__ = ["ANGLE_UNITS", "FORMATS", "QUANTITIES", "Format", "Masked", "Samples", "read", "write_csv"]
 
-FORMATS: Final[dict[str, Format]] = {module.FORMAT.name: module.FORMAT for module in (delimited, cornell, merl, npz)}
+FORMATS: Final[dict[str, Format]] = {
+    module.FORMAT.name: module.FORMAT
+    for module in (delimited, cornell, merl, npz, npy, parquet, arrow, alta, astm, nist, curet, rgl)
+}
 
 HEAD = 64 * 1024  # bytes by which a file's format is told; a longer preamble needs format=
+LARGEST = 2 * 2**30  # bytes of a file; what is in it takes several times as much memory
 
 
 def read(
@@ -25,12 +32,18 @@ def read(
     format: str | None = None,  # noqa: A002 - the fixed public name
     quantity: str | None = None,
     angle_unit: str | None = None,
+    *,
+    columns: str | Sequence[str] | None = None,
+    material: int | str | None = None,
 ) -> Samples:
     """The samples of a measured file, values in 1/sr; its format is told by its content, never by its extension.
 
     format      a name from FORMATS insists on that format
     quantity    "brdf", "brdf_cos" or "reflectance_factor", where the file does not say it
     angle_unit  "degrees" or "radians", where the file does not say it
+    columns     the names of a table's columns as a header row has them, a list or separated by commas, where the file
+                has none or other names
+    material    which one, where a file holds several
 
     Raises FormatError (unreadable, unknown, damaged, or something is undeclared), SamplesError (a row is no
     reflectance measurement) or UnknownNameError; the message is one sentence with what to do.
@@ -42,17 +55,44 @@ def read(
     ):
         if name is not None and name not in known:
             raise unknown_name(field, str(name), known, field=field)
+    given = {name: value for name, value in (("columns", columns), ("material", material)) if value is not None}
     file = Path(path)
     try:
-        with file.open("rb") as opened:
-            head = opened.read(HEAD)
-        if not head:
-            raise FormatError(f"Expected {file.name} to hold measurements, got an empty file. Check that it was saved.")
-        return FORMATS[format or detect(head)].read(file, quantity, angle_unit)
+        head = _head(file)
+        found = FORMATS[format or ("csv" if columns is not None else detect(head))]
+        for field, value in given.items():
+            if field not in found.options:
+                raise FormatError(
+                    f"Expected {field} to be left out, as a file of the format {found.name} takes none, "
+                    f"got {str(value)[:40]!r}. Drop the argument.",
+                    field=field,
+                )
+        return found.read(file, quantity, angle_unit, **given)
     except OSError as error:
         raise FormatError(
             f"Expected path to be a readable file, got {file.name!r} ({error.strerror}). Check the path.", field="path"
         ) from error
+
+
+def _head(file: Path) -> bytes:
+    """The file's first bytes; FormatError where it is empty, too large, or a pipe, which could wait forever."""
+    about = file.stat()
+    if not stat.S_ISREG(about.st_mode) and not stat.S_ISDIR(about.st_mode):
+        raise FormatError(
+            f"Expected path to be a plain file, got a pipe or device, {file.name!r}. Save its content first.",
+            field="path",
+        )
+    if about.st_size > LARGEST:
+        raise FormatError(
+            f"Expected {file.name} to be at most {LARGEST:,} bytes long, got {about.st_size:,}. "
+            "Split it, or keep fewer samples.",
+            field="path",
+        )
+    with file.open("rb") as opened:
+        head = opened.read(HEAD)
+    if not head:
+        raise FormatError(f"Expected {file.name} to hold measurements, got an empty file. Check that it was saved.")
+    return head
 
 
 def detect(head: bytes) -> str:
@@ -67,11 +107,11 @@ def detect(head: bytes) -> str:
     known = "; ".join(f"{name} ({format_.description})" for name, format_ in FORMATS.items())
     first = next((line for line in head.split(b"\n") if line.strip() and not line.lstrip().startswith(b"#")), b"")
     text = first.decode("ascii", errors="replace").strip()
-    begins = (
-        f" It begins with {text[:60]!r}; for a table, format='csv' says what its header lacks."
-        if text.isprintable()
-        else ""
-    )
+    begins = f" It begins with {text[:60]!r}; for a table, format='csv' says what its header lacks."
+    if text and all(number(word) is not None for word in text.replace(",", " ").split()):
+        begins = f" It begins with the numbers {text[:60]!r}: for a table without a header row, pass columns."
     raise FormatError(
-        f"Expected the file to be of a known format, got none of them. Known: {known}.{begins}", field="format"
+        f"Expected the file to be of a known format, got none of them. Known: {known}."
+        + (begins if text.isprintable() else ""),
+        field="format",
     )

@@ -44,7 +44,11 @@ def is_direction(name: str) -> bool:
 
 def parse_header(line: str) -> Header:
     """The columns that a header row names; FormatError where one is unknown, missing or there twice."""
-    delimiter, names = split_header(line)
+    return header_of(*split_header(line))
+
+
+def header_of(delimiter: str | None, names: tuple[str, ...]) -> Header:
+    """What the columns of these names hold; FormatError where one is unknown, missing or there twice."""
     directions: dict[str, int] = {}
     units: dict[str, str | None] = {}
     extras: dict[str, int] = {}

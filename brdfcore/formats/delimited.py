@@ -7,28 +7,26 @@
 
 Directions: theta_i, phi_i and theta_o, phi_o (theta_s and theta_r mean theta_o), or wi_x .. wo_z. Values: one column
 `value`, or r, g, b, or one column a wavelength in nm. A sample with an empty value cell, or with a direction at the
-horizon, is masked. `# azimuth_observed: false` says that the sample was never turned about its normal, whatever wi
+horizon, is masked. A file without a header row, or with other names, is read with `columns`, the names in the file's
+order. `# azimuth_observed: false` says that the sample was never turned about its normal, whatever wi
 does. Other comment lines are ignored.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
 import torch
 
 from ..errors import FormatError
-from ._assemble import from_columns
-from ._declared import declared
+from ._columns import DECLARATIONS, Source, samples_of, stated_of, value_columns
 from ._format import Format
-from ._header import ANGLES, VECTORS, Header, is_direction, parse_header, split_header, value_channels
+from ._header import ANGLES, header_of, is_direction, split_header, value_channels
 from ._table import line_of, parse_rows
-from ._text import brief, head_text, text_of
-from .samples import ANGLE_UNITS, QUANTITIES, Samples, SamplesKeywords, angles
+from ._text import brief, head_text, number, text_of
+from .samples import Samples, angles
 
 _COMMENT = re.compile(r"^[ \t]*#[ \t]*(\w+)[ \t]*:(.*)$", re.MULTILINE)
-_DECLARATIONS = ("quantity", "angle_unit", "azimuth_observed")
 _DECLARE_UNIT = (
     "Name the columns theta_i_deg or theta_i_rad, add the line '# angle_unit: degrees' (or radians) to the file, "
     "or pass angle_unit."
@@ -40,52 +38,50 @@ def sniff(head: bytes) -> bool:
     """Whether the first row that is no comment names a direction as only this format does."""
     text = head_text(head)
     found = _header_line(text) if text is not None else None
-    return found is not None and any(is_direction(name) for name in split_header(found[0])[1])
+    if found is None or found[0].split()[0].upper() == "VARS":  # which an ASTM file writes before its names
+        return False
+    return any(is_direction(name) for name in split_header(found[0])[1])
 
 
-def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
+def read(
+    path: Path, quantity: str | None, angle_unit: str | None, columns: str | Sequence[str] | None = None
+) -> Samples:
     """The samples of a delimited file, values in 1/sr; FormatError or SamplesError names the line at fault."""
     text = text_of(path)
     found = _header_line(text)
     if found is None:
         raise FormatError("Expected a header row that names the columns, got none. Add it above the data.")
     line, start, first_line = found
-    comments = _declarations(text)
-    header = parse_header(line)
-    measured_quantity = declared("quantity", QUANTITIES, comments.get("quantity"), quantity, _DECLARE_QUANTITY)
-    units = {name: _unit(name, header, comments.get("angle_unit"), angle_unit) for name in header.units}
+    delimiter, names = split_header(line)
+    headless = all(number(name) is not None for name in names)
+    if columns is None and headless:
+        raise FormatError(
+            f"Expected a header row that names the columns, got {brief(line.strip())} at line {first_line - 1}. "
+            "Add it above the data, or pass columns, such as 'theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value'.",
+            field="columns",
+        )
+    if columns is not None:
+        listed = columns.split(",") if isinstance(columns, str) else columns
+        given = tuple(str(name).strip().lower() for name in listed)
+        if len(given) != len(names):
+            raise FormatError(
+                f"Expected columns to name {len(names)} columns as line {first_line - 1} has, got {len(given)}. "
+                "Name each column of the file once.",
+                field="columns",
+            )
+        names = given
+        start, first_line = (start - len(line) - 1, first_line - 1) if headless else (start, first_line)
+    header = header_of(delimiter, names)
     body = text[start:]
     rows = parse_rows(body, first_line, header.delimiter, header.names)
-    needed = [column for column in range(len(header.names)) if column not in header.values]
-    empty = np.isnan(rows[:, needed])
-    if empty.any():
-        row, index = (int(k) for k in np.argwhere(empty)[0])
-        name = header.names[needed[index]]
-        raise FormatError(
-            f"Expected {name} at line {line_of(body, first_line, row)} to be a number, got an empty cell. "
-            "Fill it in or remove the row; only a value may be empty.",
-            field=name,
-        )
-    columns = {name: rows[:, column] for name, column in header.directions.items()}
-    if units:
-        directions = {name: np.deg2rad(columns[name]) if units[name] == "degrees" else columns[name] for name in ANGLES}
-    else:
-        directions = {w: np.stack([columns[name] for name in VECTORS if name.startswith(w)], -1) for w in ("wi", "wo")}
-    keywords: SamplesKeywords = {
-        "channels": header.channels,
-        "quantity": measured_quantity,
-        "source": path.name,
-        "format": "csv",
-        "where": lambda row: f"line {line_of(body, first_line, row)}",
-        "azimuth_observed": _azimuth_observed(comments.get("azimuth_observed")),
-    }
-    if header.sigma:
-        keywords["sigma"] = np.broadcast_to(rows[:, header.sigma], (len(rows), len(header.channels)))
-    if "weight" in header.extras:
-        keywords["weight"] = rows[:, header.extras["weight"]]
-    if "cell" in header.extras:
-        keywords["cell"] = rows[:, header.extras["cell"]]
-    return from_columns(directions, rows[:, header.values], **keywords)
+    source = Source(
+        file=path.name,
+        format="csv",
+        where=lambda row: f"line {line_of(body, first_line, row)}",
+        declare_quantity=_DECLARE_QUANTITY,
+        declare_unit=_DECLARE_UNIT,
+    )
+    return samples_of(header, rows, _declarations(text), quantity, angle_unit, source)
 
 
 def write_csv(samples: Samples, path: str | Path, comments: Mapping[str, str] | None = None) -> None:
@@ -96,32 +92,22 @@ def write_csv(samples: Samples, path: str | Path, comments: Mapping[str, str] | 
     would not read back.
     """
     value_channels(samples.channels)
-    stated = {"quantity": "brdf"}
-    if samples.azimuth_declared is not None:
-        stated["azimuth_observed"] = str(samples.azimuth_declared).lower()
+    stated = stated_of(samples)
     for key, text in (comments or {}).items():
-        if re.fullmatch(r"\w+", key) is None or key.lower() in _DECLARATIONS or re.search(r"[\r\n]", text) is not None:
+        if re.fullmatch(r"\w+", key) is None or key.lower() in DECLARATIONS or re.search(r"[\r\n]", text) is not None:
             raise FormatError(
                 f"Expected comments to be one line each under a name of their own, got {key!r}: {text!r}. "
-                f"Use a name of letters and digits other than {', '.join(_DECLARATIONS)}, and no line break.",
+                f"Use a name of letters and digits other than {', '.join(DECLARATIONS)}, and no line break.",
                 field="comments",
             )
-    names = [f"{name}_deg" for name in ANGLES]
-    columns = [torch.rad2deg(angle).round(decimals=13) for w in (samples.wi, samples.wo) for angle in angles(w)]
-    names += samples.channels
-    columns += samples.values.unbind(1)
-    if samples.sigma is not None:
-        names += ["sigma"] if len(samples.channels) == 1 else [f"sigma_{channel}" for channel in samples.channels]
-        columns += samples.sigma.unbind(1)
-    for name, column in (("weight", samples.weight), ("cell", samples.cell)):
-        if column is not None:
-            names.append(name)
-            columns.append(column)
+    theta_phi = (angle for w in (samples.wi, samples.wo) for angle in angles(w))
+    columns = {f"{name}_deg": torch.rad2deg(a).round(decimals=13) for name, a in zip(ANGLES, theta_phi, strict=True)}
+    columns |= value_columns(samples)
     with Path(path).open("w", encoding="utf-8", newline="\n") as file:
         file.writelines(f"# {key}: {text}\n" for key, text in {**(comments or {}), **stated}.items())
-        file.write(",".join(names) + "\n")
+        file.write(",".join(columns) + "\n")
         # repr is the shortest text that reads back as the same float64
-        file.writelines(",".join(map(repr, row)) + "\n" for row in torch.stack(columns, 1).tolist())
+        file.writelines(",".join(map(repr, row)) + "\n" for row in torch.stack(list(columns.values()), 1).tolist())
 
 
 def _header_line(text: str) -> tuple[str, int, int] | None:
@@ -143,7 +129,7 @@ def _declarations(text: str) -> dict[str, str]:
     found: dict[str, str] = {}
     for match in _COMMENT.finditer(text):
         key, value = match[1].lower(), match[2].strip().lower()
-        if key in _DECLARATIONS and found.setdefault(key, value) != value:
+        if key in DECLARATIONS and found.setdefault(key, value) != value:
             raise FormatError(
                 f"Expected {key} to be declared once, got {brief(found[key])} and {brief(value)}. "
                 "Remove the wrong comment line.",
@@ -152,25 +138,12 @@ def _declarations(text: str) -> dict[str, str]:
     return found
 
 
-def _unit(name: str, header: Header, comment: str | None, argument: str | None) -> str:
-    """The unit of one angle: by its name, by a comment line or by the argument, which must agree."""
-    in_name = header.units[name]
-    if in_name is not None and comment is not None and in_name != comment:
-        raise FormatError(
-            f"Expected angle_unit to be {in_name!r} as the column {name} has it, got {brief(comment)} in a comment. "
-            "Correct one of them.",
-            field="angle_unit",
-        )
-    return declared("angle_unit", ANGLE_UNITS, in_name or comment, argument, _DECLARE_UNIT)
-
-
-def _azimuth_observed(comment: str | None) -> bool | None:
-    return None if comment is None else declared("azimuth_observed", ("true", "false"), comment, None, "") == "true"
-
-
 FORMAT = Format(
     name="csv",
     description="CSV, TSV or columns: a header row with theta_i, phi_i, theta_o, phi_o or wi_x .. wo_z, then values",
     sniff=sniff,
     read=read,
+    options=("columns",),
+    suffix=".csv",
+    write=write_csv,
 )

@@ -39,9 +39,8 @@ def sniff(head: bytes) -> bool:
     return head[:12] == np.array(SHAPE, dtype="<i4").tobytes()
 
 
-def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
-    """The valid bins of a MERL file as samples, values in 1/sr; FormatError where it is not whole."""
-    declared("quantity", QUANTITIES, "brdf", quantity, "")
+def stored_values(path: Path) -> Array:
+    """What a MERL file stores, (3, bins), negative where it is invalid; FormatError where it is not whole."""
     bins = math.prod(SHAPE)
     expected, actual = 12 + 3 * bins * 8, path.stat().st_size
     with path.open("rb") as file:
@@ -67,6 +66,13 @@ def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
             f"plane at bin ({at}). The file is damaged: fetch it again.",
             field="values",
         )
+    return stored
+
+
+def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
+    """The valid bins of a MERL file as samples, values in 1/sr; FormatError where it is not whole."""
+    declared("quantity", QUANTITIES, "brdf", quantity, "")
+    stored = stored_values(path)
     wi, wo, cell = grid()
     negative = (stored < 0).any(0)
     below = ~negative & ((wi[:, 2] <= HORIZON) | (wo[:, 2] <= HORIZON))
@@ -74,7 +80,8 @@ def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
     masked = (Masked(_NEGATIVE, int(negative.sum())), Masked(_BELOW, int(below.sum())))
     if len(kept) == 0:
         raise FormatError(
-            f"Expected a MERL file to hold at least one valid bin, got {bins:,} invalid ones. Check that it is whole.",
+            f"Expected a MERL file to hold at least one valid bin, got {len(wi):,} invalid ones. "
+            "Check that it is whole.",
             field="values",
         )
     return Samples(
@@ -110,6 +117,33 @@ def grid() -> tuple[Array, Array, Array]:
     wi = np.stack([c * x + s * z, y, -s * x + c * z], -1)
     wo = np.stack([-c * x + s * z, -y, s * x + c * z], -1)
     return wi, wo, cell
+
+
+def bins(wi: Array, wo: Array) -> npt.NDArray[np.intp]:
+    """The bin, counted in the file's order, that holds each pair of directions (N, 3), as BRDFRead.cpp finds it."""
+    places = (place.astype(int) for place in coordinates(wi, wo))
+    i, j, k = (np.clip(place, 0, n - 1) for place, n in zip(places, SHAPE, strict=True))
+    found: npt.NDArray[np.intp] = (i * SHAPE[1] + j) * SHAPE[2] + k
+    return found
+
+
+def coordinates(wi: Array, wo: Array) -> tuple[Array, Array, Array]:
+    """The place of each pair of directions (N, 3) along the table's axes, in bins: k to k + 1 is within bin k."""
+    half = wi + wo
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    sine = np.hypot(half[:, 0], half[:, 1])
+    theta_h = np.arctan2(sine, half[:, 2])
+    # wi in the frame of the half vector: turned by -phi_h about z, then by -theta_h about y
+    cosine = np.divide(half[:, 0], sine, out=np.ones_like(sine), where=sine > 0)
+    sine_phi = np.divide(half[:, 1], sine, out=np.zeros_like(sine), where=sine > 0)
+    x, y = wi[:, 0] * cosine + wi[:, 1] * sine_phi, wi[:, 1] * cosine - wi[:, 0] * sine_phi
+    x, z = x * half[:, 2] - wi[:, 2] * sine, x * sine + wi[:, 2] * half[:, 2]
+    theta_d, phi_d = np.arctan2(np.hypot(x, y), z), np.arctan2(y, x) % math.pi
+    return (
+        np.sqrt(theta_h / (math.pi / 2)) * SHAPE[0],
+        theta_d / (math.pi / 2) * SHAPE[1],
+        phi_d / math.pi * SHAPE[2],
+    )
 
 
 FORMAT = Format(

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from ..errors import BrdfError, FormatError, SamplesError
 from ._assemble import from_columns
 from ._checks import default_where
+from ._columns import TRUTH, stated_of
 from ._declared import declared
 from ._format import Format
 from ._header import ANGLES
@@ -84,7 +85,7 @@ def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
     if "cell" in arrays:
         keywords["cell"] = arrays["cell"]
     if "azimuth_observed" in stated:
-        told = declared("azimuth_observed", ("true", "false"), stated["azimuth_observed"], None, _HOW)
+        told = declared("azimuth_observed", TRUTH, stated["azimuth_observed"], None, _HOW)
         keywords["azimuth_observed"] = told == "true"
     return from_columns(directions, values, **keywords)
 
@@ -172,9 +173,23 @@ def _load(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Array:
     return array.reshape(()) if name in _WORDS else array if name in _TEXTS else array.astype(float)
 
 
+def write_npz(samples: Samples, path: Path) -> None:
+    """None; writes all that `read` gives back, with any channel names, bit for bit."""
+    arrays: dict[str, Any] = {name: np.array(word) for name, word in stated_of(samples).items()}
+    arrays["channels"] = np.array(samples.channels)
+    for name in ("wi", "wo", "values", "sigma", "weight", "cell"):
+        array = getattr(samples, name)
+        if array is not None:
+            arrays[name] = array.numpy()
+    with path.open("wb") as file:  # given a name, NumPy would add a suffix
+        np.savez_compressed(file, **arrays)
+
+
 FORMAT = Format(
     name="npz",
     description="NumPy archive: wi and wo, or theta_i, phi_i, theta_o and phi_o; values; channels, sigma, weight",
     sniff=sniff,
     read=read,
+    suffix=".npz",
+    write=write_npz,
 )

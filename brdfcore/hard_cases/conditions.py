@@ -7,9 +7,12 @@ cancels, or a factor that vanishes. The bars of the hard cases are wider by it; 
 from collections.abc import Callable
 
 from ..models import Model
+from ..models._compensation import coefficients
+from .compensation import Table, mean_lost
 from .diffuse import oren_nayar, oren_nayar_energy_preserving
 from .formulas import disk_radius2, entry, lafortune_product
 from .fresnel import schlick
+from .microfacets import TABLES
 from .symbols import Number, Symbols, Values
 
 EPS = 2.0**-52
@@ -63,9 +66,17 @@ IN_DOUBLE: dict[str, Condition] = {
 }
 
 
+def _compensated(table: Table, s: Symbols, v: Values) -> Number:
+    """Of 1 - Gbar, where nearly all light is lost to single scattering, and of the place within a table's cell."""
+    mean = mean_lost(s, table, v["a"])
+    return 4 * mean / (1 - mean) + max(coefficients(table.name).shape)
+
+
 def condition(choice: Model, s: Symbols, v: Values, eps: float) -> Number:
     """The relative error that roundings by `eps` and in double precision may be amplified to, in exact arithmetic."""
     own, in_double = entry(CONDITION, choice), entry(IN_DOUBLE, choice)
     error = (own(s, v) if own else 0) * eps + (in_double(s, v) if in_double else 0) * EPS
+    if "compensated" in choice.options:
+        error = error + _compensated(entry(TABLES, choice), s, v) * EPS
     lobe = "f0" in choice.parameter and "kd" not in choice.parameter
     return error + _schlick(s, v) * eps if lobe else error

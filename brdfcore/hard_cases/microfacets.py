@@ -78,7 +78,7 @@ def _density(
     return formula
 
 
-_TABLES = {
+TABLES = {
     "ggx(compensated)": compensation.Table("ggx_correlated", True, compensation.algebraic),
     "ggx(separable, compensated)": compensation.Table("ggx_separable", False, compensation.algebraic),
     "beckmann(compensated)": compensation.Table("beckmann_correlated", True, compensation.gaussian),
@@ -92,11 +92,11 @@ VALUE: dict[str, Callable[[Symbols, Values], tuple[Number, Number]]] = {
     **{f"{name}(separable)": _value(*lobe, separable=True) for name, lobe in _LOBES.items()},
     **{
         key: _value(*_LOBES[key.partition("(")[0]], separable=not table.correlated, table=table)
-        for key, table in _TABLES.items()
+        for key, table in TABLES.items()
     },
 }
 
 DENSITY: dict[str, Callable[[Symbols, Values], Number]] = {
     **{name: _density(*lobe) for name, lobe in _LOBES.items()},
-    **{key: _density(*_LOBES[key.partition("(")[0]], table) for key, table in _TABLES.items()},
+    **{key: _density(*_LOBES[key.partition("(")[0]], table) for key, table in TABLES.items()},
 }

@@ -2,6 +2,20 @@
 
 from ._figure import kind_of, save, to_bytes
 from .albedo import albedo
+from .comparison import comparison
+from .directions import directions
 from .lobes import check_scale, lobes
+from .residuals import residuals, residuals_of
 
-__all__ = ["albedo", "check_scale", "kind_of", "lobes", "save", "to_bytes"]
+__all__ = [
+    "albedo",
+    "check_scale",
+    "comparison",
+    "directions",
+    "kind_of",
+    "lobes",
+    "residuals",
+    "residuals_of",
+    "save",
+    "to_bytes",
+]

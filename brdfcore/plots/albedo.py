@@ -19,13 +19,15 @@ import torch
 from ..energy.albedo import albedo as directional_albedo
 from ..errors import InvalidValueError
 from ..models.material import Material, material
+from ..tabulated import Tabulated
 from ._figure import COLOURS, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = npt.NDArray[np.float64]
-Materials = Material | str | Sequence[Material | str] | Mapping[str, Material | str]
+One = Material | Tabulated | str
+Materials = One | Sequence[One] | Mapping[str, One]
 
 TICKS = (0, 30, 60, 75, 85, 88, 89, 89.9, 89.99)  # degrees
 LAST = 89.99  # degrees
@@ -51,13 +53,19 @@ def albedo(
     named = _named(materials)
     theta = _degrees(torch.linspace(0, 1, POINTS, dtype=torch.float64).numpy() * _place(np.asarray(LAST)))
     curves = dict(_curve(label, given, theta, phi_deg, tolerance, channel) for label, given in named.items())
-    anisotropic = any("anisotropic" in term.model.options for given in named.values() for term in given.form.terms)
+    anisotropic = any(_anisotropic(given) for given in named.values())
     return _draw(theta, curves, title, f"azimuth {phi_deg:g}°" if anisotropic else "", tolerance)
 
 
-def _named(materials: Materials) -> dict[str, Material]:
+def _anisotropic(given: Material | Tabulated) -> bool:
+    if isinstance(given, Tabulated):
+        return not given.grid.isotropic
+    return any("anisotropic" in term.model.options for term in given.form.terms)
+
+
+def _named(materials: Materials) -> dict[str, Material | Tabulated]:
     """Every material under its label."""
-    if isinstance(materials, Material | str):
+    if isinstance(materials, Material | Tabulated | str):
         materials = [materials]
     given = dict(materials) if isinstance(materials, Mapping) else {str(one): one for one in materials}
     if not 1 <= len(given) <= _MOST:
@@ -65,11 +73,11 @@ def _named(materials: Materials) -> dict[str, Material]:
             f"Expected materials to be one to {_MOST}, got {len(given)}. Draw them in several figures.",
             field="materials",
         )
-    return {label: one if isinstance(one, Material) else material(one) for label, one in given.items()}
+    return {label: material(one) if isinstance(one, str) else one for label, one in given.items()}
 
 
 def _curve(
-    label: str, given: Material, theta: Array, phi_deg: float, tolerance: float, channel: int | None
+    label: str, given: Material | Tabulated, theta: Array, phi_deg: float, tolerance: float, channel: int | None
 ) -> tuple[str, Array]:
     """The label, which says the channel where there are several, and the albedos of that channel."""
     with torch.no_grad():

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from ..formats.samples import Samples
     from ..models.material import Material
+    from ..tabulated import Tabulated
 
 SCALES = ("linear", "cube_root", "log")
 _PANELS = 6
@@ -35,7 +36,7 @@ _DECADES = 4  # that the log scale shows below the largest value
 
 
 def lobes(
-    material: "Material",
+    material: "Material | Tabulated",
     samples: "Samples | None" = None,
     *,
     theta_i_deg: Sequence[float] | None = None,
@@ -59,7 +60,7 @@ def lobes(
             f"Expected theta_i_deg to be one or more angles in [0, 90), got {incidences}. Name angles of incidence.",
             field="theta_i_deg",
         )
-    index, name = _channel(material, samples, channel)
+    index, name = drawn_channel(material, samples, channel)
     azimuth = _azimuth(samples)
     theta = torch.linspace(-math.pi / 2, math.pi / 2, 1441, dtype=torch.float64)[1:-1]
     curves, points = [], []
@@ -73,9 +74,12 @@ def lobes(
         points.append(_points(samples, incidence, index, azimuth))
     turned = samples is not None and samples.azimuth_observed
     plane = f"azimuth {math.degrees(float(azimuth)):.0f}°" if turned else ""
-    return _draw(
-        curves, points, incidences, scale, title or material.form.text(), [f"channel {name}" * bool(name), plane]
-    )
+    return _draw(curves, points, incidences, scale, title or _name(material), [f"channel {name}" * bool(name), plane])
+
+
+def _name(material: "Material | Tabulated") -> str:
+    """What the figure is called: the material's structure, or the file that was measured."""
+    return material.form.text() if hasattr(material, "form") else str(material)
 
 
 def check_scale(scale: str) -> None:
@@ -84,7 +88,9 @@ def check_scale(scale: str) -> None:
         raise unknown_name("a scale", scale, SCALES, field="scale")
 
 
-def _channel(material: "Material", samples: "Samples | None", channel: str | int | None) -> tuple[int, str]:
+def drawn_channel(
+    material: "Material | Tabulated", samples: "Samples | None", channel: str | int | None
+) -> tuple[int, str]:
     """The index and the name of the channel that is drawn."""
     names = samples.channels if samples is not None else tuple(str(i) for i in range(material.channels))
     if channel is None:

@@ -20,6 +20,7 @@ import torch
 
 from brdfcore.errors import BrdfError
 from brdfcore.fitting import Progress, fit
+from brdfcore.fitting.comparison import compare
 
 from .. import tables
 from ..datasets import Datasets
@@ -79,8 +80,13 @@ def _fitted(say: Say, data: Path, body: bytes) -> str:
         loss = progress.loss if math.isfinite(progress.loss) else None
         say(("progress", json.dumps({"stage": progress.stage, "fraction": progress.fraction, "loss": loss})))
 
-    fitted = fit(samples, **request.arguments(), progress=report)
-    return json.dumps(fitted.to_dict(), allow_nan=False)
+    arguments = {**request.arguments(), "progress": report}
+    if request.models is None:
+        result = fit(samples, request.asked, **arguments).to_dict()
+    else:
+        compared = compare(samples, request.models, **arguments)
+        result = {**compared.best.to_dict(), "comparison": compared.to_dict()}
+    return json.dumps(result, allow_nan=False)
 
 
 def _tabulated(say: Say, data: Path, body: bytes) -> str:

@@ -1,6 +1,6 @@
 """The routes, one file a resource."""
 
-from . import albedo, batches, datasets, evaluate, events, fits, health, models, page, plots
+from . import albedo, batches, datasets, evaluate, events, export, fits, formats, health, models, page, plots
 
 ROUTERS = (
     datasets.router,
@@ -8,9 +8,11 @@ ROUTERS = (
     events.router,
     batches.router,
     plots.router,
+    export.router,
     albedo.router,
     evaluate.router,
     models.router,
+    formats.router,
     health.router,
     page.router,
 )

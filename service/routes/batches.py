@@ -118,7 +118,7 @@ def _accepted(request: Request, content: bytes) -> Batch:
         channels, observed = len(dataset.report["channels"]), dataset.report["azimuth_observed"]
         for model in asked.models:
             fit = FitRequest(dataset=name, model=model, **options)
-            check(channels, **fit.arguments(), azimuth_observed=observed)
+            check(channels, model, **fit.arguments(), azimuth_observed=observed)
             shown = RequestView(**fit.model_dump(exclude={"samples"}), samples=None).model_dump_json()
             work = _jobs.work_of("fit", shown, azimuth_observed=observed)
             made.append(Asked(shown, fit.model_dump_json().encode(), "fit", work))

@@ -30,6 +30,9 @@ class Declarations(BaseModel):
     format: str | None = Field(None, description="insists on a format; without it the content decides")
     quantity: str | None = Field(None, description="brdf, brdf_cos or reflectance_factor")
     angle_unit: str | None = Field(None, description="degrees or radians")
+    columns: str | None = Field(
+        None, max_length=2000, description="names of a table's columns, separated by commas, where it lacks them"
+    )
 
 
 @router.post(

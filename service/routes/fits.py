@@ -80,6 +80,6 @@ def _accepted(request: Request, body: bytes) -> Job:
         if dataset is None:
             raise missing(asked.dataset or "")
         channels, azimuth_observed = len(dataset.report["channels"]), dataset.report["azimuth_observed"]
-    check(channels, **asked.arguments(), azimuth_observed=azimuth_observed)
+    check(channels, asked.asked, **asked.arguments(), azimuth_observed=azimuth_observed)
     shown = RequestView(**asked.model_dump(exclude={"samples"}), samples=summary).model_dump_json()
     return _jobs.submitted(request, "fit", shown, body, azimuth_observed=azimuth_observed)

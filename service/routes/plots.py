@@ -46,6 +46,17 @@ class Albedo(BaseModel):
     channel: str | None = Field(None, description="which is drawn; the brightest, if none")
 
 
+class Residuals(BaseModel):
+    """What a plot of residuals shows."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    channel: str | None = Field(None, description="which is drawn; the brightest, if none")
+
+
+Asked = Lobes | Albedo | Residuals
+
+
 @router.get("/lobes.svg", response_class=Response, responses=responses(404, 406, 409, 422))
 async def lobes_svg(request: Request, fit_id: str, asked: Annotated[Lobes, Query()]) -> Response:
     """The lobes in the plane of incidence and the measured points over them, as SVG."""
@@ -70,7 +81,19 @@ async def albedo_png(request: Request, fit_id: str, asked: Annotated[Albedo, Que
     return await _plot(request, fit_id, asked, "png")
 
 
-async def _plot(request: Request, fit_id: str, asked: Lobes | Albedo, kind: Kind) -> Response:
+@router.get("/residuals.svg", response_class=Response, responses=responses(404, 406, 409, 422))
+async def residuals_svg(request: Request, fit_id: str, asked: Annotated[Residuals, Query()]) -> Response:
+    """What the fit leaves unexplained, against theta_o for each incidence and against theta_h, as SVG."""
+    return await _plot(request, fit_id, asked, "svg")
+
+
+@router.get("/residuals.png", response_class=Response, responses=responses(404, 406, 409, 422))
+async def residuals_png(request: Request, fit_id: str, asked: Annotated[Residuals, Query()]) -> Response:
+    """What the fit leaves unexplained, against theta_o for each incidence and against theta_h, as PNG."""
+    return await _plot(request, fit_id, asked, "png")
+
+
+async def _plot(request: Request, fit_id: str, asked: Asked, kind: Kind) -> Response:
     require_accepted(request, _MEDIA_TYPE[kind])
     service = state(request)
     job = found(service, "fit", fit_id)
@@ -92,16 +115,18 @@ async def _plot(request: Request, fit_id: str, asked: Lobes | Albedo, kind: Kind
     return Response(image, headers=headers, media_type=_MEDIA_TYPE[kind])
 
 
-def _drawn(service: State, body: bytes, result: str, asked: Lobes | Albedo, kind: Kind) -> bytes:
+def _drawn(service: State, body: bytes, result: str, asked: Asked, kind: Kind) -> bytes:
     outcome = FitOutcome.model_validate_json(result)
     material = bc.Material.from_json(outcome.material)
-    if isinstance(asked, Lobes):
-        samples = service.datasets.samples(FitRequest.model_validate_json(body))
+    if isinstance(asked, Albedo):
+        return plots.to_bytes(_albedo(material, outcome, asked), kind)
+    samples = service.datasets.samples(FitRequest.model_validate_json(body))
+    if isinstance(asked, Residuals):
+        figure = plots.residuals_of(material, samples, channel=asked.channel)
+    else:
         figure = plots.lobes(
             material, samples, theta_i_deg=asked.theta_i_deg or None, scale=asked.scale, channel=asked.channel
         )
-    else:
-        figure = _albedo(material, outcome, asked)
     return plots.to_bytes(figure, kind)
 
 

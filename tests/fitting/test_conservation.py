@@ -58,6 +58,15 @@ def test_what_exceeds_1_ends_at_1(case):
     assert kept.to_dict()["conservation"]["directions"] == kept.conservation.directions >= 1
 
 
+def test_intervals_lie_along_the_limit():
+    """At the horizon kd + ks = 1, so that what one gains the other loses, and both are surer than they were."""
+    samples = noisy(CASES["at the horizon"][0])
+    free, kept = (bc.fit(samples, "lambert + ggx(constant)", conserve_energy=asked) for asked in (False, True))
+    at = [kept.covariance_keys.index(key) for key in ("lambert.kd", "ggx.ks")]
+    assert float(kept.correlations[at[0], at[1]]) < -0.99
+    assert float(free.correlations[at[0], at[1]]) > -0.9
+
+
 def test_no_other_optimiser_finds_less():
     """scipy's SLSQP under the albedos at 60 angles, from our own result and from others: within 1e-4 of our loss."""
     samples = noisy("lambert(kd=0.6) + ward_neumann(rs=0.9, a=0.5)")

@@ -9,6 +9,7 @@ from fit_cases import TRUE, directions, measured_from
 
 import brdfcore as bc
 from brdfcore.errors import BrdfError
+from brdfcore.fitting.result import STATUSES
 
 MODEL = "lambert + ward_bounded(isotropic)"
 
@@ -115,6 +116,7 @@ def test_the_same_seed_gives_the_same_result_to_the_last_digit() -> None:
     first, second = (bc.fit(samples, MODEL, seed=7).to_dict() for _ in range(2))
     for result in (first, second):
         result["cost"].pop("seconds")
+        result["certificate"].pop("seconds")
         result.pop("report")
     assert first == second
 
@@ -134,7 +136,7 @@ def test_a_parameter_that_the_data_cannot_show_gets_no_number() -> None:
 def test_two_equal_terms_are_named_as_undetermined() -> None:
     samples = measured_from("lambert(kd=0.2)", count=100, noise=0.01)
     fit = bc.fit(samples, "lambert + lambert")
-    assert set(fit.undetermined) == {"lambert.kd", "lambert_2.kd"}
+    assert fit.undetermined == ("lambert.kd with lambert_2.kd",)
 
 
 def test_a_value_on_its_bound_has_no_interval_and_is_said_to_be_there() -> None:
@@ -160,7 +162,7 @@ def test_fewer_samples_than_values_gives_no_intervals() -> None:
 def test_extreme_data_end_with_a_status_and_no_nan(value: float, loss: str) -> None:
     wi, wo = directions(30, 0)
     fit = bc.fit(bc.Samples(wi, wo, torch.full((30, 1), value)), "lambert + kurt(isotropic)", loss=loss)
-    assert fit.status in ("converged", "stopped_early")
+    assert fit.status in STATUSES
     assert all(math.isfinite(error) for error in fit.errors.values())
     assert all(bool(v.isfinite().all()) for v in fit.material.values().values())
 

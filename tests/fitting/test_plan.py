@@ -93,7 +93,7 @@ REFUSED = {
     "gray as a text": ({"gray": "lambert.kd"}, ParameterError, "gray", "Write ['lambert.kd']"),
     "fixed text": ({"fixed": {"kurt.f0": "a"}}, ParameterError, "kurt.f0", "to be a number"),
     "fixed truth": ({"fixed": {"kurt.f0": True}}, ParameterError, "kurt.f0", "to be a number"),
-    "no text": ({"model": None}, ModelTextError, "model", "got NoneType"),
+    "no text": ({"model": None}, ModelTextError, "model", "got None"),
     "seed": ({"seed": -1}, ParameterError, "seed", "got -1"),
     "large seed": ({"seed": 10**23}, ParameterError, "seed", "2^63"),
     "total too large": ({"model": "lambert(kd=3 - kurt.ks) + kurt"}, ParameterError, "lambert.kd", "Change the total"),

@@ -1,4 +1,4 @@
-"""Standard errors and intervals against scipy, Cramer-Rao, and the coverage that 95 % promises."""
+"""Standard errors and intervals against scipy, and the coverage that 95 % promises where the noise is not known."""
 
 import numpy as np
 import pytest
@@ -10,8 +10,7 @@ from fit_cases import TRUE, measured_from
 import brdfcore as bc
 from brdfcore.demo import DATA, MATERIAL, MODEL, linoleum
 from brdfcore.fitting import fit_batch
-from brdfcore.fitting.uncertainty import t_quantile
-from brdfcore.geometry import geometry
+from brdfcore.fitting.student import t_quantile
 
 TABLE_1 = {"ward_bounded.rs": 0.04982, "ward_bounded.a": 0.03172, "lambert.kd": 0.175 - 0.04982}
 
@@ -48,7 +47,7 @@ def test_each_channel_has_the_noise_of_its_own() -> None:
     """Three channels whose noise differs tenfold: their own kd's intervals differ as much."""
     samples = measured_from(TRUE)
     noise = torch.randn(samples.values.shape, generator=torch.Generator().manual_seed(8), dtype=torch.float64)
-    noisier = samples.values + noise * torch.tensor([0.01, 0.1, 1.0]) / samples.wi[:, 2:]
+    noisier = samples.values + noise * torch.tensor([0.005, 0.05, 0.5]) / samples.wi[:, 2:]
     fit = bc.fit(bc.Samples(samples.wi, samples.wo, noisier), "lambert + ward_bounded(isotropic)")
     errors = fit.standard_errors["lambert.kd"]
     assert 5 < float(errors[1] / errors[0]) < 12
@@ -157,6 +156,7 @@ def test_a_sample_that_determines_a_value_alone_leaves_it_a_useless_interval() -
     values = torch.tensor([3.0, 0.06, 0.064, 0.063, 0.065, 0.06]).unsqueeze(-1)
     fit = bc.fit(bc.Samples(wi, wo, values), "lambert + ward_bounded(isotropic)", fixed={"ward_bounded.a": 0.02})
     assert fit.intervals["ward_bounded.rs"].tolist() == [0.0, 1.0]
+    assert "Few samples decide ward_bounded.rs, so an interval there is as long as the range" in fit.message
     assert fit.to_dict()["standard_errors"]["ward_bounded.rs"] is None
     assert float(fit.intervals["lambert.kd"].diff()) < 0.05
 
@@ -196,43 +196,3 @@ def test_table_1_comes_back_with_the_tie_to_rho() -> None:
         assert float(low) < true < float(high)
         assert float(fit.parameters[key]) == pytest.approx(true, rel=0.01)
     assert float(fit.parameters["lambert.kd"] + fit.parameters["ward_bounded.rs"]) == pytest.approx(0.175, abs=1e-15)
-
-
-def cramer_rao(samples: bc.Samples) -> dict[str, float]:
-    """The least standard deviations of rs and a that any unbiased estimate can have, from the true parameters."""
-
-    def f(p: torch.Tensor) -> torch.Tensor:
-        form = bc.material(MATERIAL).form
-        values = {"ward_bounded.rs": p[0], "ward_bounded.a": p[1]}
-        return form.f(values, geometry(samples.wi, samples.wo, form.needs))[:, 0]
-
-    true = torch.tensor([0.04982, 0.03172], dtype=torch.float64)
-    scaled = torch.autograd.functional.jacobian(f, true) / samples.sigma
-    deviations = torch.linalg.inv(scaled.T @ scaled).diagonal().sqrt().tolist()
-    return {"ward_bounded.rs": deviations[0], "ward_bounded.a": deviations[1], "lambert.kd": deviations[0]}
-
-
-def check_coverage(seeds: int) -> None:
-    least = cramer_rao(linoleum())
-    covered, widths = dict.fromkeys(TABLE_1, 0), {key: [] for key in TABLE_1}
-    for fit in fit_batch([linoleum(seed) for seed in range(seeds)], MODEL):
-        for key, true in TABLE_1.items():
-            low, high = fit.intervals[key].tolist()
-            covered[key] += low <= true <= high
-            widths[key].append(high - low)
-    level = 1 - (1 - 0.01) ** (1 / len(TABLE_1))  # Sidak: 1 % for all intervals together
-    for key in TABLE_1:
-        p = scipy.stats.binomtest(covered[key], seeds, 0.95).pvalue
-        assert p > level, f"{key}: {covered[key]} of {seeds} intervals hold the true value (p = {p:.2g})"
-        ratio = float(np.median(widths[key])) / (2 * 1.959964 * least[key])
-        assert 0.9 < ratio < 1.1, f"{key}: median width is {ratio:.3f} of Cramer-Rao's"
-    print({key: covered[key] / seeds for key in TABLE_1})
-
-
-def test_intervals_cover_the_truth() -> None:
-    check_coverage(60)
-
-
-@pytest.mark.full
-def test_intervals_cover_the_truth_on_400_seeds() -> None:
-    check_coverage(400)

@@ -100,10 +100,6 @@ def test_other_numbers_are_not_claimed(text: str) -> None:
     assert not cornell.sniff(text.encode())
 
 
-def test_fuzz(fuzz: Callable[[str, bytes, int], int]) -> None:
-    assert fuzz("cornell", CORNELL.encode(), 300) > 100
-
-
 @pytest.mark.parametrize("name", ["garnet_red", "cayman", "acryl_blue"])
 def test_real_files_peak_at_the_mirror_direction(name: str, measured: Path) -> None:
     samples = read(measured / "cornell" / f"{name}.brdf")

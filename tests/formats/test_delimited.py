@@ -9,6 +9,7 @@ import pytest
 import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mirror_peak import brightest
 
 from brdfcore.errors import FormatError, SamplesError, UnknownNameError
 from brdfcore.formats import Masked, Samples, read, write_csv
@@ -243,5 +244,41 @@ def test_write_csv_refuses_what_would_not_read_back(tmp_path: Path) -> None:
     assert not (tmp_path / "out.csv").exists()
 
 
-def test_damaged_files_are_read_or_refused(fuzz: Callable[[str, bytes, int], int]) -> None:
-    assert fuzz("csv", CSV.encode(), 300) > 100
+HEADLESS = "# measured by hand\n45 -180 45 0 12.5\n30 -180 10 20 .25\n"
+COLUMNS = "theta_i_deg, phi_i_deg, theta_o_deg, phi_o_deg, value"
+
+
+def test_a_file_without_a_header_row_is_read_with_columns(write: Write) -> None:
+    samples = read(write(HEADLESS), quantity="brdf", columns=COLUMNS)
+    expected = Samples.from_angles([45, 30], -180, [45, 10], [0, 20], [12.5, 0.25], "degrees")
+    assert samples.hash == expected.hash
+    assert read(write(HEADLESS), quantity="brdf", columns=COLUMNS.split(", ")).hash == expected.hash
+    with pytest.raises(SamplesError, match=r"at line 3\."):
+        read(write(HEADLESS.replace("30 -180", "95 -180")), quantity="brdf", columns=COLUMNS)
+
+
+def test_columns_replace_other_names(write: Write) -> None:
+    named = "zenith;azimuth;zenith_out;azimuth_out;BRDF\n" + HEADLESS.split("\n", 1)[1].replace(" ", ";")
+    samples = read(write(named), quantity="brdf", columns=COLUMNS)
+    assert samples.hash == read(write(HEADLESS), quantity="brdf", columns=COLUMNS).hash
+
+
+def test_columns_have_to_fit_the_file(write: Write) -> None:
+    with pytest.raises(FormatError, match=r"columns to name 5 columns as line 2 has, got 2\.") as caught:
+        read(write(HEADLESS), columns="value,sigma")
+    assert caught.value.field == "columns"
+    with pytest.raises(FormatError, match=r"a header row .* got '45 -180 45 0 12\.5' at line 2\. .* or pass columns"):
+        read(write(HEADLESS), format="csv", quantity="brdf")
+
+
+@pytest.mark.parametrize(("name", "off"), [("chassis_brdf", 2), ("solar_array_brdf", 2)])
+def test_real_satellites_peak_at_the_mirror_direction(name: str, off: float, measured: Path) -> None:
+    path = measured / "satellite" / f"{name}.csv"
+    with pytest.raises(FormatError, match="for a table without a header row, pass columns"):
+        read(path)
+    samples = read(path, quantity="brdf", columns="theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value")
+    assert len(samples) > 700
+    assert not samples.azimuth_observed
+    for theta in samples.wi[:, 2].unique():
+        one = samples.subset(samples.wi[:, 2] == theta)
+        assert brightest(one, 1).item() <= off

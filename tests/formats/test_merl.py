@@ -156,10 +156,6 @@ def test_a_file_without_a_valid_bin_is_refused(small_merl: object, write: Write)
         read(write(content))
 
 
-def test_fuzz(small_merl: object, fuzz: Callable[[str, bytes, int], int]) -> None:
-    assert fuzz("merl", merl_bytes(), 300) > 100
-
-
 def test_a_reconstructed_material_peaks_at_the_half_vector(measured: Path, tmp_path: Path) -> None:
     path = tmp_path / "reconstructed.binary"
     path.write_bytes(merl_reconstruction(measured, "blue-metallic-paint"))

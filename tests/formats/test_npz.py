@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from format_cases import npz_arrays, npz_bytes
+from format_cases import npz_arrays
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -202,7 +202,3 @@ def test_a_member_that_is_no_array_is_refused(write: Write) -> None:
     ):
         with pytest.raises(FormatError, match=r"Expected a readable NumPy archive, got .*The file is damaged"):
             read(write(content), format="npz")
-
-
-def test_fuzz(tmp_path: Path, fuzz: Callable[[str, bytes, int], int]) -> None:
-    assert fuzz("npz", npz_bytes(tmp_path), 300) > 100

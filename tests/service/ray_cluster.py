@@ -35,22 +35,24 @@ def main(folder: pathlib.Path, fits: int, kills: int) -> None:
     start = [*RAY, "start", "--head", "--num-cpus=2", "--include-dashboard=false", "--disable-usage-stats"]
     subprocess.run(start, check=True, capture_output=True)
     os.environ |= {"BRDF_RAY_ADDRESS": "auto", "RAY_USAGE_STATS_ENABLED": "0"}
-    data, rng, accepted, killed = folder / "data", random.Random(3), [], 0
+    data, rng, killed = folder / "data", random.Random(3), 0
     try:
         with server(data, workers=4) as (process, client):
             with sqlite3.connect(data / "jobs.sqlite3", timeout=10) as db:
                 db.executescript(COUNTING)
-            for seed in range(fits):
-                given = {"model": "lambert + kurt", "optimizer": "adam", "seed": seed}
-                accepted.append(client.fit(measured_diffuser(200), wait=False, **given).id)
+            submitted = (
+                client.fit(measured_diffuser(2000), model="lambert + kurt", wait=False, seed=n) for n in range(fits)
+            )
+            accepted = [fit.id for fit in submitted]
             while killed < kills:
-                time.sleep(rng.uniform(0.2, 1.0))
+                time.sleep(rng.uniform(0.0, 0.5))
+                ended = sum(client.get(fit_id).job_status == "succeeded" for fit_id in accepted)
+                if 2 * killed > ended:  # a fit that is killed three times is given up: kill on, but not the same ones
+                    continue
                 for pid in rng.sample(found, 1) if (found := workers()) else ():
                     with contextlib.suppress(ProcessLookupError):
                         os.kill(pid, signal.SIGKILL)
                         killed += 1
-                if not client.recent(status="queued") and not client.recent(status="running"):
-                    break
             process.kill()
             process.wait()
         with server(data, workers=4) as (_, client):

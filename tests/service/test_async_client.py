@@ -43,6 +43,7 @@ def test_everything_that_can_be_asked(settings: Settings, tmp_path: pathlib.Path
         assert fit.parameters["lambert.kd"] == pytest.approx(KD, rel=0.01)
         assert told[-1] == 1.0
         assert b"<svg" in await fit.plot()
+        assert (await fit.export("json")).content.startswith(b"{")
         assert (await client.fit(path, model="lambert", quantity="brdf")).reused == fit.id
         assert (await (await client.get(fit.id)).refresh()).job_status == "succeeded"
         inline, steep = await client.fits(

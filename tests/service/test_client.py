@@ -1,6 +1,7 @@
 """The client, against the app without sockets, and alone where the service misbehaves."""
 
 import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -110,9 +111,16 @@ def test_arguments_reach_the_service(client: Client) -> None:
 def test_the_report_and_the_plots_are_for_people(client: Client) -> None:
     fit = client.fit(as_samples(), model="lambert")
     assert fit.report().startswith("lambert\nconverged")
-    assert b"<svg" in fit.plot()
+    assert all(b"<svg" in fit.plot(name) for name in ("lobes", "albedo", "residuals"))
     assert fit.plot("lobes", "png", scale="log", theta_i_deg=[20, 40]).startswith(b"\x89PNG")
     assert repr(fit) == f"FitResult({fit.id}, 'lambert', succeeded)"
+
+
+def test_a_fit_is_exported(client: Client) -> None:
+    fit = client.fit(as_samples(), model="lambert")
+    made = fit.export("radiance")
+    assert b"void WGMDfunc brdf" in made.content
+    assert (made.difference, made.holds) == (0.0, "Radiance material WGMDfunc.")
 
 
 def test_many_samples_travel_as_a_file(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,6 +152,16 @@ def test_a_fit_need_not_be_waited_for(client: Client) -> None:
     fit.delete()
     with pytest.raises(ProblemError, match="Expected the id of a fit"):
         fit.refresh()
+
+
+def test_formats_are_listed_and_a_table_is_named(client: Client, tmp_path: pathlib.Path) -> None:
+    assert [found.name for found in client.formats()] == list(bc.FORMATS)
+    path = tmp_path / "table.txt"
+    path.write_text("10 0 20 180 .2\n20 0 20 180 .2\n")
+    columns = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value"
+    assert client.upload(path, quantity="brdf", columns=columns).report["samples"] == 2
+    fit = client.fit(path, model="lambert", quantity="brdf", columns=columns)
+    assert fit.parameters["lambert.kd"] == pytest.approx(0.2 * math.pi)
 
 
 def test_models_are_listed(client: Client) -> None:

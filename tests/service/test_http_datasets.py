@@ -31,7 +31,7 @@ def test_a_file_becomes_a_dataset_with_a_report(http: TestClient, settings: Sett
     assert answer.headers["location"] == f"/v1/datasets/{dataset['id']}"
     assert dataset["bytes"] == len(content)
     assert dataset["sha256"] == hashlib.sha256(content).hexdigest()
-    assert dataset["declared"] == {"format": None, "quantity": "brdf", "angle_unit": None}
+    assert dataset["declared"] == {"format": None, "quantity": "brdf", "angle_unit": None, "columns": None}
     assert dataset["report"]["format"] == "csv"
     assert dataset["report"]["samples"] == 24
     assert dataset["report"]["masked"] == []

@@ -10,7 +10,9 @@ from service_cases import KD, csv_file, measured_diffuser
 from starlette.testclient import TestClient
 
 import brdfcore as bc
+from brdfcore.fitting.result import STATUSES
 from service.app import create_app
+from service.schemas import FitOutcome
 from service.settings import Settings
 
 Body = dict[str, Any]
@@ -74,6 +76,7 @@ def test_the_request_is_shown_without_its_samples(fit: dict[str, Any]) -> None:
     assert fit["request"] == {
         "dataset": None,
         "model": "lambert",
+        "models": None,
         "loss": "cosine",
         "optimizer": "auto",
         "fixed": {},
@@ -87,6 +90,32 @@ def test_the_request_is_shown_without_its_samples(fit: dict[str, Any]) -> None:
         "max_theta_deg": None,
         "conserve_energy": False,
     }
+
+
+def test_several_models_are_one_job_whose_result_compares_them(http: TestClient, request_body: Body) -> None:
+    del request_body["model"]
+    models = ["lambert + ward(isotropic)", "lambert"]
+    body = request_body | {"models": models, "fixed": {"ward.a": 0.2}, "seed": 3}
+    fit = http.post("/v1/fits", json=body, headers={"prefer": "wait=20"}).json()
+    assert fit["status"] == "succeeded", fit
+    assert fit["request"]["models"] == models
+    assert fit["request"]["model"] is None
+    ranking = fit["result"]["comparison"]["ranking"]
+    assert sorted(row["model"] for row in ranking) == sorted(models)
+    assert [row["rank"] for row in ranking] == [1, 2]
+    assert ranking[0]["objective"] <= ranking[1]["objective"]
+    assert ranking[0]["fit"]["parameters"] == fit["result"]["parameters"]
+    assert http.get(f"/v1/fits/{fit['id']}/plots/lobes.svg").status_code == 200
+    refused = http.post("/v1/fits", json=body | {"models": ["lambert", "lambrt"]}).json()
+    assert "Did you mean 'lambert'" in refused["detail"]
+    for wrong in ({"model": "lambert"}, {"models": None}):
+        assert "either model or models" in http.post("/v1/fits", json=body | wrong).json()["detail"]
+
+
+def test_auto_shows_its_ladder(http: TestClient, request_body: Body) -> None:
+    fit = http.post("/v1/fits", json=request_body | {"model": "auto"}, headers={"prefer": "wait=20"}).json()
+    assert fit["status"] == "succeeded", fit
+    assert [rung["effect"] for rung in fit["result"]["ladder"]][:2] == ["diffuse", "lobe"]
 
 
 def test_vectors_and_angles_are_the_same_samples(http: TestClient, request_body: Body, fit: dict[str, Any]) -> None:
@@ -135,7 +164,8 @@ def test_every_argument_reaches_the_fit(http: TestClient) -> None:
     made = http.post("/v1/fits", json=body | narrow, headers={"prefer": "wait=20"}).json()
     assert made["request"]["max_theta_deg"] == 60
     result = made["result"]
-    assert all(0.1 <= value <= 0.2 for value in result["parameters"]["ward_bounded.rs"])
+    rs = bc.Material.from_json(result["material"]).values()["ward_bounded.rs"]  # the data leave it free
+    assert bool(((rs >= 0.1) & (rs <= 0.2)).all())
     assert "steeper than 60 degrees" in result["data"]["masked"][0]["reason"]
     assert result["conservation"]["directions"] == 0
     assert result["certificate"]["energy_conserving"]
@@ -266,8 +296,9 @@ def test_a_finished_fit_cannot_be_cancelled(http: TestClient, fit: dict[str, Any
     assert "succeeded" in answer.json()["detail"]
 
 
-def test_lobes_are_drawn_as_svg_and_png(http: TestClient, fit: dict[str, Any]) -> None:
-    path = f"/v1/fits/{fit['id']}/plots/lobes"
+@pytest.mark.parametrize("plot", ["lobes", "residuals"])
+def test_plots_are_drawn_as_svg_and_png(http: TestClient, fit: dict[str, Any], plot: str) -> None:
+    path = f"/v1/fits/{fit['id']}/plots/{plot}"
     svg, png = http.get(f"{path}.svg"), http.get(f"{path}.png")
     assert svg.headers["content-type"].startswith("image/svg+xml")
     assert b"<svg" in svg.content
@@ -303,6 +334,28 @@ def test_a_plot_that_cannot_be_drawn_is_a_problem(
 ) -> None:
     answer = http.get(f"/v1/fits/{fit['id']}/plots/lobes.svg", params=query)
     assert (answer.status_code, answer.json()["field"]) == (422, field)
+
+
+def test_residuals_of_a_channel_that_is_not_there_are_a_problem(http: TestClient, fit: dict[str, Any]) -> None:
+    path = f"/v1/fits/{fit['id']}/plots/residuals.svg"
+    assert b"incidence" in http.get(path, params={"channel": "value"}).content
+    answer = http.get(path, params={"channel": "red"})
+    assert (answer.status_code, answer.json()["field"]) == (422, "channel")
+
+
+def test_what_the_data_leave_free_is_in_the_answer(http: TestClient) -> None:
+    """The sample was never turned: a width across has no number, and the status is a word that clients know."""
+    body = {"samples": measured_diffuser(), "model": "lambert + ward_bounded(anisotropic)"}
+    result = http.post("/v1/fits", json=body, headers={"prefer": "wait=20"}).json()["result"]
+    assert result["status"] == "undetermined"
+    assert result["undetermined"] == ["ward_bounded.ay with ward_bounded.rs"]
+    assert result["parameters"]["ward_bounded.ay"] is None
+    assert set(result["combinations"][0]) == {"ward_bounded.ay", "ward_bounded.rs"}
+    assert any("azimuth was not observed" in sentence for sentence in result["warnings"])
+    assert len(result["covariance"]) == len(result["covariance_keys"])
+    FitOutcome.model_validate(result)
+    known = FitOutcome.model_json_schema()["properties"]["status"]["enum"]
+    assert tuple(known) == STATUSES
 
 
 def test_a_plot_must_be_acceptable(http: TestClient, fit: dict[str, Any]) -> None:
@@ -362,10 +415,14 @@ def test_openapi_has_every_route_and_its_errors(http: TestClient) -> None:
         "/v1/fits/{fit_id}": ["delete", "get"],
         "/v1/fits/{fit_id}/cancel": ["post"],
         "/v1/fits/{fit_id}/events": ["get"],
+        "/v1/fits/{fit_id}/export/{format}": ["get"],
         "/v1/fits/{fit_id}/plots/albedo.png": ["get"],
         "/v1/fits/{fit_id}/plots/albedo.svg": ["get"],
         "/v1/fits/{fit_id}/plots/lobes.png": ["get"],
         "/v1/fits/{fit_id}/plots/lobes.svg": ["get"],
+        "/v1/fits/{fit_id}/plots/residuals.png": ["get"],
+        "/v1/fits/{fit_id}/plots/residuals.svg": ["get"],
+        "/v1/formats": ["get"],
         "/v1/models": ["get"],
     }
     submit = paths["/v1/fits"]["post"]

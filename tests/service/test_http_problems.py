@@ -76,7 +76,7 @@ BAD_FITS = {
     "a path as dataset": (lambda b: (b.pop("samples"), b.update(dataset="../lock")), "dataset", "POST /v1/datasets"),
     "no data": (lambda body: body.pop("samples"), "body", "exactly one"),
     "two sources of data": (put("dataset", value="f" * 64), "body", "exactly one"),
-    "no model": (lambda body: body.pop("model"), "model", "got nothing"),
+    "no model": (lambda body: body.pop("model"), "body", "either model or models"),
     "an unknown field": (put("modle", value="lambert"), "modle", "Remove it"),
     "an unknown field of samples": (put("samples", "theta_i", value=[0.1]), "samples.theta_i", "Remove it"),
     "below the horizon": (put("samples", "theta_i_deg", 3, value=95.0), "samples.theta_i_deg", "theta_i"),

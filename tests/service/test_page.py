@@ -225,35 +225,20 @@ def test_a_failed_fit_says_why(page: Any, url: str) -> None:
     expect(page, "#result").to_be_hidden()
 
 
-def test_what_the_contract_offers_beyond_the_rest_is_offered(page: Any, url: str) -> None:
-    def widened(route: Any) -> None:
-        contract = route.fetch().json()
-        form = contract["paths"]["/v1/fits"]["post"]["requestBody"]["content"]["application/json"]["schema"]
-        form["properties"]["models"] = {}
-        format_ = {"name": "format", "in": "path", "schema": {"enum": ["radiance", "merl"]}}
-        contract["paths"]["/v1/fits/{fit_id}/export/{format}"] = {"get": {"parameters": [format_]}}
-        route.fulfill(json=contract)
-
-    def exported(route: Any) -> None:
-        headers = {"content-disposition": 'attachment; filename="fit.rad"'}
-        route.fulfill(body="void BRTDfunc fitted", headers=headers)
-
-    page.route(f"{url}/openapi.json", widened)
-    page.route("**/export/radiance", exported)
-    page.goto(url)
-    page.check("#use-auto")
+def test_a_choice_by_the_data_and_files_for_other_programs(page: Any) -> None:
+    page.check("#use-auto")  # offered once the contract has been read
     page.click("#example")
     only(page)
     expect(page, "#start").to_have_text("Fit")
-    page.uncheck("#use-auto")
-    page.fill("#text", "lambert")
     page.click("#start")
     expect(page, "#details .verdict").to_contain_text("Conserves energy")
-    assert page.get_by_role("button", name="merl", exact=True).is_visible()
-    with page.expect_download() as download:
-        page.get_by_role("button", name="radiance", exact=True).click()
-    assert download.value.suggested_filename == "fit.rad"
-    assert pathlib.Path(download.value.path()).read_text() == "void BRTDfunc fitted"
+    expect(page, "#details").to_contain_text("How it was chosen")
+    expect(page, "#taking pre >> nth=0").to_contain_text('model="auto"')
+    for name, begins in (("radiance", "# "), ("json", "{")):
+        with page.expect_download() as download:
+            page.get_by_role("button", name=name, exact=True).click()
+        assert pathlib.Path(download.value.path()).read_text().startswith(begins)
+        assert download.value.suggested_filename.startswith("fit_")
 
 
 def test_a_service_with_a_key_asks_for_it(browser: Any, tmp_path: pathlib.Path) -> None:

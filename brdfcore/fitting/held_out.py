@@ -1,0 +1,139 @@
+"""`bc.held_out`: how well a model foretells incidences that it was not fitted to.
+
+    error = sqrt(sum w r_i^2 / sum w)      r_i, the loss's difference at sample i, of the fit that never saw i's block
+
+Each fold is fitted to the samples of the others, from the optimum of all, all folds as one batch; so it costs a few
+steps beside the fit itself, and finds the optimum next to that of all the data.
+"""
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ..errors import ParameterError
+from ..formats.samples import Samples, angles
+from ._fit import planned
+from .data import Data
+from .folds import split
+from .least_squares import least_squares
+from .problem import Problem
+from .search import search
+
+_STEPS = 40  # of a fold; it begins next to its optimum
+_ENOUGH = 1e-9  # of a fold's loss: what another step would gain
+
+
+@dataclass(frozen=True)
+class Incidence:
+    """A block of samples that were left out together: its mean theta_i [rad], fold, samples and error."""
+
+    theta: float
+    fold: int
+    samples: int
+    error: float
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors at samples that were left out, root mean squares in the unit of the loss's residual, by fold and by block.
+
+    `fitted` is the same error of the fit to all samples, at the samples it was fitted to.
+    """
+
+    error: float
+    fitted: float
+    folds: tuple[float, ...]
+    incidences: tuple[Incidence, ...]
+    loss: str
+    seconds: float  # without the fit to all samples
+
+    def to_dict(self) -> dict[str, Any]:
+        """The errors as JSON-able data."""
+        return {**vars(self), "folds": list(self.folds), "incidences": [vars(one).copy() for one in self.incidences]}
+
+
+def held_out(
+    samples: Samples, model: str, loss: str = "cosine", folds: int = 5, seed: int = 0, **keywords: Any
+) -> HeldOut:
+    """The model's error under the loss at incidences that were left out; the keywords are those of `fit`.
+
+    folds    how many parts of the data are left out in turn, at least 2; what a part is: folds.py
+    seed     of the scan of the fit to all samples, and of what goes into which part
+
+    Raises what `fit` raises, and ParameterError where there are not enough samples.
+    """
+    plan, (kept,) = planned([samples], model, loss=loss, seed=seed, **keywords)
+    check_folds(folds, len(kept))
+    found = search(plan, [kept], loss, keywords.get("optimizer", "auto"), seed, lambda stage, fraction, value: None)
+    begun = time.perf_counter()
+    block, fold = split(kept, folds, seed)
+    squares, weights = left_out(found.problem, found.outcome.x, fold)
+    own = _squares(found.problem, found.outcome.x, torch.zeros_like(fold))
+    theta = _mean(angles(kept.wi)[0], torch.ones_like(weights), block)
+    sizes = block.bincount().tolist()
+    error = _mean(squares, weights, block).sqrt().tolist()
+    at = dict(zip(block.tolist(), fold.tolist(), strict=True))
+    return HeldOut(
+        float((squares.sum() / weights.sum()).sqrt()),
+        float((own.sum() / weights.sum()).sqrt()),
+        tuple(_mean(squares, weights, fold).sqrt().tolist()),
+        tuple(Incidence(t, at[i], sizes[i], error[i]) for i, t in enumerate(theta.tolist())),
+        loss,
+        time.perf_counter() - begun,
+    )
+
+
+def check_folds(folds: object, count: int) -> None:
+    """Raise where this is no number of folds, or there are fewer samples than folds."""
+    if isinstance(folds, bool) or not isinstance(folds, int) or folds < 2:
+        raise ParameterError(f"Expected folds to be a whole number from 2 on, got {folds!r}. Use 5.", field="folds")
+    if count < folds:
+        raise ParameterError(
+            f"Expected folds to be at most the number of samples, got {folds} for {count}. Lower it.", field="folds"
+        )
+
+
+def left_out(problem: Problem, x: Tensor, fold: Tensor) -> tuple[Tensor, Tensor]:
+    """The weighed squares (N,) of each sample's residuals in the fit that did not see its fold, and their weights.
+
+    x (1, D) is the optimum of the problem's only material, fold (N,) each sample's fold, from 0 on.
+    """
+    data, folds = problem.data, int(fold.max()) + 1
+    seen = (fold != torch.arange(folds).unsqueeze(1)).to(data.y).unsqueeze(1)  # (K, 1, N)
+    which = torch.arange(folds)
+    parts = Data(
+        data.g,
+        data.c,
+        data.y.expand(folds, -1, -1),
+        data.root_weight * seen,
+        None if data.sigma is None else data.sigma.expand(folds, -1, -1),
+        data.scales.rows(torch.zeros_like(which)),
+    )
+    scale = None if problem.robust_scale is None else problem.robust_scale.expand(folds)
+    trained = Problem(problem.plan, [], problem.loss_kind, robust_scale=scale, data=parts)
+    rows = x.expand(folds, -1)
+    if problem.size:
+        rows = least_squares(trained, rows.clone(), which, _ENOUGH, _STEPS).x
+    weights = data.root_weight.square().expand_as(data.y).sum((0, 1))
+    return _squares(problem, rows, fold), weights
+
+
+def _squares(problem: Problem, x: Tensor, row: Tensor) -> Tensor:
+    """The weighed squares (N,) of the residuals at each sample of the x (K, D) that `row` (N,) names."""
+    found, at = [], 0
+    for piece in problem.data.chunks(len(x)):
+        here = row[at : at + len(piece.c)]
+        f = problem.f(x, piece)[here, :, torch.arange(len(here))].T.unsqueeze(0)  # (1, C, n)
+        found.append(problem.residuals(f, piece, None)[0].sum((0, 1)))
+        at += len(here)
+    return torch.cat(found)
+
+
+def _mean(values: Tensor, weights: Tensor, label: Tensor) -> Tensor:
+    """The sums of the values over those of the weights, a label (L,)."""
+    sums = torch.zeros(2, int(label.max()) + 1, dtype=torch.float64)
+    sums.index_add_(1, label, torch.stack([values, weights]))
+    return sums[0] / sums[1].clamp(min=1e-300)

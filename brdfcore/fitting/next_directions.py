@@ -1,0 +1,234 @@
+"""`bc.next_directions`: where to measure next, so that the fit's values become surest for the instrument's time.
+
+    cov = A^-1 B A^-1,    A = sum j j^T,    B = sum v j j^T,    chosen to make det cov least (D-optimal)
+
+j is the exact derivative of a residual by the free values at the optimum, v the variance of that residual: what the
+fit to old and new samples will have, under its loss, whether or not that weighs as the noise would. Known sigma makes
+v; else the residuals do, as noise that is even and noise that grows with the value (signal_noise.py), and both are
+carried to the new directions. Values are taken one by one, then exchanged one by one as long as that gains. A value
+that the data leave free is known to lie in its box and no better, so that the first directions are those that
+determine it.
+
+What is proposed lies on a grid that a goniometer reaches: polar angles to `max_theta`, in the plane of incidence, and
+out of it where the data are; the sample is turned where the data's was. Values on an end of their box count as if
+they could leave it: that more data would move them is what the present data cannot exclude.
+Source: Fedorov 1972, exchange of design points; White 1980 for A^-1 B A^-1.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from ..errors import ParameterError
+from ..formats.samples import Samples, angles
+from ..geometry import from_angles
+from .criterion import spread
+from .data import Data
+from .limits import check_max_theta
+from .losses import LOSSES
+from .plan import Plan
+from .problem import Problem
+from .result import Fit
+from .signal_noise import noise
+
+_STEP = 5.0  # degrees between polar angles
+_NEAR = (-8.0, -6.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)  # degrees from the mirror direction
+_TURN = 30.0  # degrees between azimuths
+_ROUNDS = 4  # of exchanges; one or two find all there is
+_WORK = 2e8  # candidates times the cube of the values: the grid is thinned beyond
+
+
+@dataclass(frozen=True)
+class NextDirections:
+    """Directions to measure next, the most useful first, and what they are expected to do.
+
+    wi, wo            (K, 3) unit vectors that leave the surface
+    shrinkage         key -> () or (C,): the width of the value's interval after, as a share of that before [1]; of a
+                      value that the data left undetermined, as a share of its box
+    information       by how much the logarithm of 1/det cov rises [1]
+    """
+
+    wi: Tensor
+    wo: Tensor
+    shrinkage: dict[str, Tensor]
+    information: float
+
+    @property
+    def angles(self) -> dict[str, Tensor]:
+        """theta_i, phi_i, theta_o, phi_o, each (K,) [rad]."""
+        (theta_i, phi_i), (theta_o, phi_o) = angles(self.wi), angles(self.wo)
+        return {"theta_i": theta_i, "phi_i": phi_i, "theta_o": theta_o, "phi_o": phi_o}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The directions as JSON-able data, angles in degrees."""
+        return {
+            "directions": [
+                dict(zip((f"{name}_deg" for name in self.angles), row, strict=True))
+                for row in torch.rad2deg(torch.stack(list(self.angles.values()), -1)).tolist()
+            ],
+            "shrinkage": {key: value.tolist() for key, value in self.shrinkage.items()},
+            "information": self.information,
+        }
+
+
+def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -> NextDirections:
+    """So many directions, no two alike, whose samples would make the fit's values surest.
+
+    max_theta    [rad] the steepest polar angle that the instrument reaches, of light and of viewer
+
+    Raises ParameterError for a count below 1, an angle out of range, or a fit without a free value.
+    """
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise ParameterError(f"Expected count to be a whole number from 1 on, got {count!r}. Use 10.", field="count")
+    check_max_theta(max_theta)
+    plan = Plan(fit.form, fit.values, frozenset(fit.fixed), frozenset(fit.gray), frozenset(fit.per_channel), ())
+    problem = Problem(plan, fit.samples, LOSSES[fit.loss])
+    x = problem.pack(fit.values).unsqueeze(0)
+    if not problem.size:
+        raise ParameterError(
+            "Expected fit to have a free value, got one whose every value is fixed. Free one, then fit.", field="fit"
+        )
+    design = _Design(problem, x, fit)
+    wi, wo = reachable(fit.samples, max_theta)
+    thin = max(1, math.ceil(len(wi) * problem.size**3 / _WORK))
+    wi, wo = wi[::thin], wo[::thin]
+    columns, variance = design.candidates(wi, wo)
+    chosen = _exchanged(design, columns, variance, min(count, len(wi)))
+    before = design.covariance(design.a, design.b)
+    a, b = design.with_(columns[chosen], variance[chosen])
+    after = design.covariance(a.sum(0) + design.a, b.sum(0) + design.b)
+    ratio = (after.diagonal() / before.diagonal()).sqrt()
+    shrinkage = {key: ratio[at].reshape(plan.start[key].shape) for key, at in problem.slices.items()}
+    information = float(torch.logdet(before) - torch.logdet(after))
+    return NextDirections(wi[chosen], wo[chosen], shrinkage, information)
+
+
+def reachable(samples: Samples, max_theta: float) -> tuple[Tensor, Tensor]:
+    """The pairs wi, wo (G, 3) that an instrument reaches which could measure the samples."""
+    across = torch.linalg.cross(samples.wi, samples.wo)[:, 2].abs()  # the sines' product, with that between azimuths
+    aside = samples.azimuth_observed or bool((across > math.sin(math.radians(1))).any())
+    theta, phi = angles(samples.wi)
+    first = math.degrees(float(phi[theta.argmax()]))
+    turns = torch.arange(0, 180, _TURN) if samples.azimuth_observed else torch.tensor([first])
+    sides = torch.arange(0, 360, _TURN) if aside else torch.tensor([0.0, 180.0])
+    limit = math.degrees(max_theta)
+    tilts = torch.tensor([*torch.arange(0, limit, _STEP).tolist(), limit])
+    grid = torch.cartesian_prod(tilts, turns, tilts, sides)
+    near = torch.cartesian_prod(tilts, turns, torch.tensor(_NEAR))
+    mirror = torch.stack([near[:, 0], near[:, 1], near[:, 0] + near[:, 2], torch.full((len(near),), 180.0)], -1)
+    mirror = mirror[(mirror[:, 2] > 0) & (mirror[:, 2] <= limit)]
+    t_i, p_i, t_o, side = torch.cat([grid, mirror]).double().deg2rad().T
+    wi, wo = from_angles(t_i, p_i), from_angles(t_o, p_i + side)
+    pairs = torch.cat([wi, wo], -1)
+    keys = torch.unique((pairs * 1e6).round() + 0.0, dim=0, return_inverse=True)[1]
+    _, order = keys.sort(stable=True)
+    firsts = order[torch.cat([torch.ones(1, dtype=torch.bool), keys[order].diff() > 0])].sort().values
+    return wi[firsts], wo[firsts]
+
+
+class _Design:
+    """What the samples so far tell of the values that are free to move, and what more would."""
+
+    def __init__(self, problem: Problem, x: Tensor, fit: Fit) -> None:
+        self.problem, self.x, self.fit = problem, x, fit
+        samples, data = fit.samples, problem.data
+        f = torch.cat([problem.f(x, piece) for piece in data.chunks(problem.channels)], -1)  # (1, C, N)
+        if samples.sigma is not None:
+            self.noise = noise(samples.sigma.T.square().reshape(-1), f.reshape(-1))
+            known = samples.sigma.T.square().unsqueeze(0)
+        else:
+            left = (1 - spread(problem, x).leverage).clamp(min=1e-3)
+            squares, values, at = [], [], 0
+            for piece in data.chunks(problem.channels):  # as the leverages stand
+                own = f[..., at : at + len(piece.c)]
+                counted = (piece.root_weight > 0).expand_as(own)
+                squares.append((own - piece.y)[counted].square())
+                values.append(own[counted])
+                at += len(piece.c)
+            self.noise = noise(torch.cat(squares) / left, torch.cat(values))
+            known = self.noise.variance(f)
+        size = problem.size
+        a, b = torch.zeros(size, size, dtype=torch.float64), torch.zeros(size, size, dtype=torch.float64)
+        total, at = 0.0, 0
+        for piece in data.chunks(problem.channels):
+            _, columns, slope = problem.jacobian(x, piece)
+            v = slope.square() * known[..., at : at + len(piece.c)]
+            at += len(piece.c)
+            a += problem.scatter_matrix(columns @ columns.mT)[0]
+            b += problem.scatter_matrix((columns * v.unsqueeze(2)) @ columns.mT)[0]
+            total += float(v.sum())
+        typical = total / max(1, at * problem.channels) or 1.0
+        ranges = (problem.high - problem.low).clamp(min=1e-9)
+        known_from_box = torch.diag(typical / ranges.square())
+        self.a, self.b = a + known_from_box, b + typical * known_from_box
+
+    def candidates(self, wi: Tensor, wo: Tensor) -> tuple[Tensor, Tensor]:
+        """The derivatives (G, C, P) of the residuals at new directions, and their variances (G, C)."""
+        problem, samples = self.problem, self.fit.samples
+        with torch.no_grad():
+            f = self.fit.material.f(wi, wo).expand(-1, problem.channels)
+        variance = self.noise.variance(f).clamp(min=1e-300)
+        weight, cell = (None if w is None else w.mean().expand(len(wi)) for w in (samples.weight, samples.cell))
+        sigma = None if samples.sigma is None else variance.sqrt()
+        new = Samples(wi, wo, f, samples.channels, sigma, weight=weight, cell=cell)
+        data = Data.of([new], problem.plan.form.needs, problem.loss_kind, problem.data.scales)
+        parts = [problem.jacobian(self.x, piece) for piece in data.chunks(problem.channels)]
+        columns = torch.cat([columns[0] for _, columns, _ in parts], -1).permute(2, 0, 1)
+        slope = torch.cat([slope[0] for _, _, slope in parts], -1).T
+        return columns, slope.square() * variance
+
+    def with_(self, columns: Tensor, variance: Tensor) -> tuple[Tensor, Tensor]:
+        """What each of some candidates adds to A and B, (K, D, D)."""
+        each = columns.unsqueeze(-1) * columns.unsqueeze(-2)  # (K, C, P, P)
+        a = self.problem.scatter_matrix(each)
+        b = self.problem.scatter_matrix(each * variance[..., None, None])
+        return a, b
+
+    def covariance(self, a: Tensor, b: Tensor) -> Tensor:
+        """A^-1 B A^-1."""
+        inverse = torch.linalg.inv(a)
+        found: Tensor = inverse @ b @ inverse
+        return found
+
+    def information(self, a: Tensor, b: Tensor, columns: Tensor, variance: Tensor) -> Tensor:
+        """Each log 1/det cov with one candidate added to A and B, (G,)."""
+        found = []
+        step = max(1, 2_000_000 // (columns.shape[1] * columns.shape[2] ** 2 + len(a) ** 2))
+        for some, v in zip(columns.split(step), variance.split(step), strict=True):
+            more_a, more_b = self.with_(some, v)
+            found.append(2 * torch.linalg.slogdet(a + more_a)[1] - torch.linalg.slogdet(b + more_b)[1])
+        return torch.cat(found)
+
+
+def _exchanged(design: _Design, columns: Tensor, variance: Tensor, count: int) -> list[int]:
+    """The candidates that make the values surest: one by one, then each exchanged for a better one if there is one."""
+    chosen: list[int] = []
+
+    def best(without: Iterable[int]) -> tuple[int, float]:
+        rest = list(without)
+        a, b = design.a, design.b
+        if rest:
+            more_a, more_b = design.with_(columns[rest], variance[rest])
+            a, b = a + more_a.sum(0), b + more_b.sum(0)
+        score = design.information(a, b, columns, variance)
+        score[rest] = -torch.inf
+        at = int(score.nan_to_num(nan=-torch.inf).argmax())
+        return at, float(score[at])
+
+    reached = -math.inf
+    for _ in range(count):
+        at, reached = best(chosen)
+        chosen.append(at)
+    for _ in range(_ROUNDS):
+        gained = False
+        for i in range(count):
+            at, score = best(chosen[:i] + chosen[i + 1 :])
+            if score > reached + 1e-9:
+                chosen[i], reached, gained = at, score, True
+        if not gained:
+            break
+    return chosen

@@ -1,0 +1,146 @@
+"""Data that cannot show what is asked of them: every fit ends with a status and a sentence, and without a NaN."""
+
+import json
+import math
+import pathlib
+
+import numpy as np
+import pytest
+import torch
+from fit_cases import TRUE, directions, measured_from
+
+import brdfcore as bc
+from brdfcore.errors import SamplesError
+from brdfcore.fitting.result import STATUSES
+
+MODELS = (
+    "lambert",
+    "lambert + kurt",
+    "lambert + ward_bounded(anisotropic) + ward_bounded(isotropic)",
+)
+WI, WO = directions(30, 0)
+RANDOM = torch.rand(30, 1, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
+MODEL_VALUES = measured_from("lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.15)", noise=0.01).values
+
+
+def one_incidence() -> bc.Samples:
+    theta_o = torch.linspace(-80, 80, 41).tolist()
+    clean = bc.Samples.from_angles(45.0, 0.0, theta_o, 180.0, [1.0] * 41, "degrees")
+    f = bc.material("lambert(kd=0.2) + kurt(isotropic, ks=0.4, f0=0.1, m=0.15, alpha=0.2)").f(clean.wi, clean.wo)
+    return bc.Samples(clean.wi, clean.wo, f.detach() * (1 + 0.02 * torch.sin(torch.arange(41.0))[:, None]))
+
+
+# the samples, and what a fit of a lobe to them must say
+CASES = {
+    "fewer samples than values": (bc.Samples(WI[:2], WO[:2], RANDOM[:2]), "2 samples of 1 channels, which are too few"),
+    "one sample": (bc.Samples(WI[:1], WO[:1], RANDOM[:1]), "1 samples of 1 channels, which are too few"),
+    "all zero": (bc.Samples(WI, WO, 0 * RANDOM), "No value is positive"),
+    "all negative": (bc.Samples(WI, WO, -RANDOM), "No value is positive"),
+    "one direction": (bc.Samples(WI[:1].expand(30, 3), WO[:1].expand(30, 3), RANDOM), "share one pair of directions"),
+    "constant": (bc.Samples(WI, WO, 0 * RANDOM + 0.3), "same value, in which no lobe can be seen"),
+    "one incidence": (one_incidence(), "All samples have one angle of incidence, 45 degrees"),
+    "colossal range": (bc.Samples(WI, WO, 10.0 ** (60 * RANDOM - 30)), "the cosine loss sees little but the peak"),
+    "tiny": (bc.Samples(WI, WO, 1e-100 * RANDOM), ""),
+    "huge": (bc.Samples(WI, WO, 1e100 * RANDOM), ""),
+}
+
+
+def check(fit: bc.Fit) -> None:
+    """The fit has a status, sentences, finite numbers throughout its material, and intervals only where it tells."""
+    assert fit.status in STATUSES
+    assert fit.message.endswith(".")
+    assert all(sentence.endswith(".") for sentence in fit.warnings)
+    assert math.isfinite(fit.objective)
+    assert all(math.isfinite(error) for error in fit.errors.values())
+    assert all(bool(value.isfinite().all()) for value in fit.material.values().values())
+    for key, value in fit.parameters.items():
+        assert not bool(fit.intervals[key][value.isnan()].isfinite().any()), key
+        assert not bool(value.isinf().any())
+    assert bool(fit.covariance.isfinite().all())
+    assert all(math.isfinite(value) for value in fit.singular_values)
+    json.dumps(fit.to_dict(), allow_nan=False)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("case", CASES)
+def test_degenerate_data_end_in_a_sentence(case: str, model: str) -> None:
+    samples, sentence = CASES[case]
+    fit = bc.fit(samples, model)
+    check(fit)
+    if model != "lambert":
+        assert sentence in " ".join(fit.warnings)
+        assert all(line in fit.report() for line in fit.warnings)
+
+
+@pytest.mark.parametrize(
+    "loss", ["log", *(pytest.param(loss, marks=pytest.mark.full) for loss in ("cube_root", "relative"))]
+)
+@pytest.mark.parametrize("case", CASES)
+def test_so_it_is_under_every_loss(case: str, loss: str) -> None:
+    check(bc.fit(CASES[case][0], "lambert + kurt", loss=loss))
+
+
+@pytest.mark.parametrize("case", ["fewer samples than values", "all zero", "constant"])
+def test_so_it_is_with_other_optimizers(case: str) -> None:
+    for optimizer in ("least_squares", "lbfgs"):
+        check(bc.fit(CASES[case][0], "lambert + ward_bounded", optimizer=optimizer))
+
+
+def test_values_whose_squares_leave_the_type_are_refused() -> None:
+    with pytest.raises(SamplesError, match=r"^Expected values to be of a size whose squares a double holds") as caught:
+        bc.fit(bc.Samples(WI, WO, 1e-200 * RANDOM), "lambert + kurt", loss="relative")
+    assert caught.value.field == "values"
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        "one direction",
+        "all zero",
+        *(pytest.param(c, marks=pytest.mark.full) for c in CASES if c not in ("one direction", "all zero")),
+    ],
+)
+def test_so_it_is_for_robust_forms_and_a_known_sigma(case: str) -> None:
+    samples, _ = CASES[case]
+    check(bc.fit(samples, "lambert + ward_bounded", robust="cauchy"))
+    sigma = samples.values.abs() * 0.01 + 1e-3
+    check(bc.fit(bc.Samples(samples.wi, samples.wo, samples.values, sigma=sigma), "lambert + ward_bounded"))
+
+
+def test_two_samples_leave_combinations_of_three_values() -> None:
+    fit = bc.fit(CASES["fewer samples than values"][0], "lambert + ward_bounded(isotropic)")
+    assert fit.status == "undetermined"
+    assert fit.undetermined
+    assert fit.covariance_keys == ()
+    assert fit.to_dict()["covariance"] is None
+
+
+def test_one_direction_determines_a_sum() -> None:
+    fit = bc.fit(CASES["one direction"][0], "lambert + ward_bounded(isotropic)")
+    assert fit.status == "undetermined"
+    assert bool(fit.parameters["lambert.kd"].isnan())
+    assert "one by one, only together" in fit.message
+    alone = bc.fit(CASES["one direction"][0], "lambert")
+    assert alone.status == "converged"
+    assert float(alone.parameters["lambert.kd"]) == pytest.approx(math.pi * float(RANDOM.mean()), rel=1e-9) or float(
+        alone.parameters["lambert.kd"]
+    ) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("name", ["chassis", "solar_array"])
+@pytest.mark.parametrize("loss", ["cosine", "log"])
+def test_the_dynamic_range_of_satellites(measured: pathlib.Path, name: str, loss: str) -> None:
+    """Peaks up to 5e4 over values of 1e-4."""
+    rows = np.loadtxt(measured / "satellite" / f"{name}_brdf.csv")
+    rows = rows[np.abs(rows[:, 2]) < 90]
+    theta_i, phi_i, theta_o, phi_o, values = rows.T
+    samples = bc.Samples.from_angles(theta_i, phi_i, theta_o, phi_o, values, "degrees")
+    for model in ("lambert + ward_bounded", "lambert + kurt"):
+        fit = bc.fit(samples, model, loss=loss)
+        check(fit)
+        assert any("times the median" in sentence for sentence in fit.warnings) == (loss == "cosine")
+
+
+def test_healthy_data_need_no_sentence() -> None:
+    assert bc.fit(measured_from(TRUE, noise=0.01), "lambert + ward_bounded").warnings == ()
+    assert bc.fit(one_incidence(), "lambert").warnings == ()

@@ -1,0 +1,119 @@
+"""Errors at incidences that were left out."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import torch
+from fit_cases import TRUE, directions, measured_from
+
+import brdfcore as bc
+from brdfcore.errors import ParameterError
+from brdfcore.fitting.folds import blocks, dealt
+from brdfcore.fitting.losses import Scales
+
+MODEL = "lambert + ward_bounded(isotropic)"
+
+
+def goniometer(
+    incidences: list[float], outgoing: int = 25, turns: tuple[float, ...] = (0.0,), seed: int = 3
+) -> bc.Samples:
+    rows = [(t, p, o, p + 180) for t in incidences for p in turns for o in np.linspace(-70, 70, outgoing)]
+    angles = np.array(rows).T
+    empty = bc.Samples.from_angles(*angles, values=np.zeros(len(rows)), unit="degrees")
+    with torch.no_grad():
+        f = bc.material("lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.2)").f(empty.wi, empty.wo)
+    noise = torch.randn(f.shape, generator=torch.Generator().manual_seed(seed), dtype=f.dtype)
+    return bc.Samples(empty.wi, empty.wo, f * (1 + 0.02 * noise))
+
+
+@pytest.mark.parametrize("loss", ["cosine", "log", "relative"])
+def test_a_fold_is_the_fit_to_the_other_samples(loss: str) -> None:
+    """The batch of weights finds what a fit of its own finds, and its error is that at the samples left out."""
+    samples = goniometer([10.0, 20.0, 35.0, 50.0, 60.0, 70.0])
+    found = bc.held_out(samples, MODEL, loss, folds=3, seed=2)
+    fold = dealt(blocks(samples, 3), samples, 3, 2)
+    for number in range(3):
+        fit = bc.fit(samples.subset(fold != number), MODEL, loss=loss)
+        rest = samples.subset(fold == number)
+        difference = bc.LOSSES[loss].difference
+        with torch.no_grad():
+            f = fit.material.f(rest.wi, rest.wo)
+        scales = Scales.of(samples.values, samples.wi[:, 2:])
+        own = difference(f, rest.values, rest.wi[:, 2:], scales).square().mean().sqrt()
+        # the relative loss's own scale is that of all samples here, of the others' in the fit by hand
+        assert found.folds[number] == pytest.approx(float(own), rel=1e-2 if loss == "relative" else 1e-5)
+    assert found.fitted < found.error
+    assert found.fitted == pytest.approx(
+        math.sqrt(bc.fit(samples, MODEL, loss=loss).errors[loss] / len(samples)), rel=1e-9
+    )
+
+
+def test_folds_are_whole_incidences_with_their_angles() -> None:
+    incidences = [10.0, 20.0, 35.0, 50.0, 60.0, 70.0]
+    found = bc.held_out(goniometer(incidences), MODEL, folds=3)
+    assert sorted(round(math.degrees(one.theta), 6) for one in found.incidences) == incidences
+    assert {one.samples for one in found.incidences} == {25}
+    by_fold = [[one.theta for one in found.incidences if one.fold == fold] for fold in range(3)]
+    assert [len(some) for some in by_fold] == [2, 2, 2]
+    mean = math.sqrt(sum(one.error**2 * one.samples for one in found.incidences) / 150)
+    assert mean == pytest.approx(found.error, rel=1e-12)
+    assert json.loads(json.dumps(found.to_dict()))["incidences"][0].keys() == {"theta", "fold", "samples", "error"}
+
+
+def test_turning_a_sample_makes_incidences_only_where_it_can_show() -> None:
+    turned = goniometer([20.0, 50.0], turns=(0.0, 45.0, 90.0))
+    assert int(blocks(turned, 5).max()) == 5
+    still = goniometer([20.0, 50.0, 70.0], turns=(0.0, 180.0))
+    assert int(blocks(still, 3).max()) == 2
+
+
+def test_without_enough_incidences_blocks_are_neighbours() -> None:
+    one = goniometer([30.0], outgoing=60)
+    block = blocks(one, 5)
+    assert int(block.max()) == 19
+    assert bool((block.diff().abs() <= 1).all()), "in-plane neighbours share a block or stand in the next"
+    assert bc.held_out(one, MODEL).error > 0
+
+
+def test_scattered_incidences_become_bands_of_theta() -> None:
+    wi, wo = directions(4000, 1)
+    block = blocks(bc.Samples(wi, wo, torch.ones(4000), azimuth_observed=False), 5)
+    assert int(block.max()) == 19
+    theta = torch.acos(wi[:, 2])
+    low, high = (torch.stack([f(theta[block == k]) for k in range(20)]) for f in (torch.min, torch.max))
+    assert bool((high[:-1] < low[1:]).all())
+    assert int(blocks(bc.Samples(wi, wo, torch.ones(4000)), 5).max()) == 79
+
+
+def test_a_model_of_too_many_values_is_seen_through() -> None:
+    """It does better at its own samples, and worse at those left out."""
+    samples = measured_from("lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.2)", count=60, noise=0.02)
+    plain, rich = bc.held_out(samples, MODEL), bc.held_out(samples, "lambert + kurt(isotropic)")
+    assert rich.fitted < 0.99 * plain.fitted
+    assert rich.error > 1.05 * plain.error
+    assert bc.held_out(samples, "lambert").error > 3 * plain.error
+
+
+def test_sigma_weight_and_robust_forms_are_those_of_the_fit() -> None:
+    known = measured_from(TRUE, noise=0.01, sigma=True)
+    assert bc.held_out(known, MODEL).error == pytest.approx(0.01, rel=0.1), "of c f, as the loss's residual is"
+    assert bc.held_out(known, MODEL, robust="cauchy").error < bc.held_out(known, MODEL).error
+    fixed = bc.held_out(
+        known, MODEL, fixed={"lambert.kd": [0.1, 0.2, 0.3], "ward_bounded.rs": 0.1, "ward_bounded.a": 0.1}
+    )
+    assert fixed.error == fixed.fitted
+
+
+def test_refusals() -> None:
+    samples = goniometer([30.0], outgoing=5)
+    for folds, advice in ((1, "from 2 on, got 1. Use 5."), (True, "got True"), (6, "got 6 for 5. Lower it.")):
+        with pytest.raises(ParameterError, match=r"^Expected folds to be ") as caught:
+            bc.held_out(samples, "lambert", folds=folds)
+        assert advice in str(caught.value)
+        assert caught.value.field == "folds"
+    same = bc.Samples(samples.wi[:1].expand(5, 3), samples.wo[:1].expand(5, 3), torch.ones(5))
+    with pytest.raises(bc.errors.SamplesError, match=r"^Expected samples to hold several directions") as caught:
+        bc.held_out(same, "lambert")
+    assert caught.value.field == "samples"
