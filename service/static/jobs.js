@@ -86,7 +86,7 @@ function row(fit, signal) {
   const tell = (/** @type {any} */ now) => {
     const { status, progress, error } = now;
     const loss = progress?.loss ?? null;
-    if (loss !== null && loss !== losses.at(-1)) losses.push(loss);
+    if (loss !== null) losses.push(Math.min(loss, losses.at(-1) ?? loss)); // the lowest so far: starts are tried in turn
     bar.value = status === "succeeded" ? 1 : (progress?.fraction ?? 0);
     said.textContent = `${WORDS[status]}${loss === null ? "" : `, loss ${shown(loss)}`}`;
     svg.draw(losses);
@@ -140,7 +140,7 @@ function sparkline(name) {
   element.append(line);
   const draw = (/** @type {number[]} */ losses) => {
     const logs = losses.map((loss) => Math.log(Math.max(loss, 1e-300)));
-    const low = Math.min(...logs), span = Math.max(...logs) - low || 1;
+    const low = Math.min(...logs), span = Math.max(Math.max(...logs) - low, 0.01); // 1 %, below which it lies flat
     const step = 96 / Math.max(logs.length - 1, 1);
     line.setAttribute("points", logs.length < 2 ? "" : logs.map((y, k) => `${2 + step * k},${21 - (18 * (y - low)) / span}`).join(" "));
   };
