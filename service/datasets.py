@@ -106,7 +106,10 @@ class Datasets:
         """The samples that a fit's request means, inline or uploaded."""
         if request.samples is not None:
             return inline_samples(request.samples)
-        name = request.dataset or ""
+        return self.read(request.dataset or "")
+
+    def read(self, name: str) -> Samples:
+        """The samples of an uploaded dataset."""
         dataset = self.get(name)
         if dataset is None:
             raise missing(name)

@@ -14,7 +14,8 @@ from .errors import problem
 from .metrics import Metrics
 from .settings import Settings
 
-OPEN = ("/healthz", "/readyz")  # that answer without a key
+OPEN = ("/", "/healthz", "/readyz")  # that answer without a key, and hold no data; so does what is under PAGE
+PAGE = "/static/"
 HEADER_LIMIT = 32 * 1024  # bytes of all headers together
 _ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _CARRIED = {
@@ -23,6 +24,8 @@ _CARRIED = {
     "cross-origin-resource-policy": "same-origin",
     "content-security-policy": "default-src 'none'; frame-ancestors 'none'",
 }
+# the page runs its own files only, and speaks to its own service only
+_PAGE = "default-src 'self'; base-uri 'none'; form-action 'none'; object-src 'none'; frame-ancestors 'none'"
 # FastAPI's own page of documentation loads its scripts from there
 _DOCS = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' https://cdn.jsdelivr.net; connect-src 'self'; "
@@ -61,6 +64,8 @@ class Guard:
                     carried.setdefault(name, value)
                 if scope["path"].startswith("/docs") and status == 200:
                     carried["content-security-policy"] = _DOCS
+                if scope["path"] == "/" or scope["path"].startswith(PAGE):
+                    carried["content-security-policy"] = _PAGE
             await send(message)
 
         try:
@@ -92,13 +97,18 @@ class Guard:
         size = sum(len(name) + len(value) for name, value in scope["headers"])
         if size > HEADER_LIMIT:
             return problem(431, f"Expected headers of at most {HEADER_LIMIT} bytes, got {size}. Send less in them.")
-        if self.settings.api_keys and owner is None and scope["path"] not in OPEN:
+        if self.settings.api_keys and owner is None and not _open(scope["path"]):
             return problem(
                 401,
                 "Expected a known API key. Send it as the header Authorization: Bearer KEY.",
                 headers={"www-authenticate": "Bearer"},
             )
         return None
+
+
+def _open(path: str) -> bool:
+    """Whether anybody may ask for it."""
+    return path in OPEN or path.startswith(PAGE)
 
 
 class JsonLines(logging.Formatter):

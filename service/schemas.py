@@ -535,6 +535,19 @@ class DatasetView(View):
     report: dict[str, Any] = Field(description="what the samples are, what was masked and why")
 
 
+class DatasetSamples(View):
+    """Measured samples of a dataset, one row each: every `stride`-th of them, from the first on."""
+
+    count: int = Field(description="samples of the dataset")
+    stride: int = Field(description="1 where every sample is here")
+    channels: list[str]
+    theta_i_deg: list[float] = Field(description="polar angle of wi [degrees]")
+    phi_i_deg: list[float] = Field(description="azimuth of wi [degrees]")
+    theta_o_deg: list[float] = Field(description="polar angle of wo [degrees]")
+    phi_o_deg: list[float] = Field(description="azimuth of wo [degrees]")
+    values: list[list[float | None]] = Field(description="one column a channel, whatever was uploaded: the BRDF [1/sr]")
+
+
 class ModelView(View):
     """A model of the registry, as its own file describes it."""
 

@@ -1,6 +1,6 @@
 """The routes, one file a resource."""
 
-from . import albedo, batches, datasets, evaluate, events, export, fits, formats, health, models, plots
+from . import albedo, batches, datasets, evaluate, events, export, fits, formats, health, models, page, plots
 
 ROUTERS = (
     datasets.router,
@@ -14,4 +14,5 @@ ROUTERS = (
     models.router,
     formats.router,
     health.router,
+    page.router,
 )

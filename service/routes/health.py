@@ -1,4 +1,4 @@
-"""Signs of life, and the way in."""
+"""Signs of life."""
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import PlainTextResponse
@@ -30,9 +30,3 @@ async def readyz(request: Request) -> HealthView:
 async def metrics(request: Request) -> Response:
     """Counts in Prometheus's text format: requests, jobs by status, the queue's depth, fit times, failures."""
     return Response(request.app.state.metrics.text(), media_type="text/plain; version=0.0.4; charset=utf-8")
-
-
-@router.get("/")
-async def root() -> dict[str, str]:
-    """Where to read on."""
-    return {"docs": "/docs", "openapi": "/openapi.json", "fits": "/v1/fits"}

@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 from brdfcore.errors import InvalidValueError
 from service import keys
 from service.app import create_app
-from service.guard import HEADER_LIMIT, JsonLines
+from service.guard import HEADER_LIMIT, OPEN, JsonLines
 from service.settings import Settings
 
 KEY, OTHER = "k" * 24, "another-long-key-0123456789"
@@ -38,12 +38,13 @@ def test_no_route_but_health_answers_without_a_key(locked: TestClient) -> None:
     for path, operations in paths.items():
         for method in operations:
             answer = locked.request(method, re.sub(r"\{\w+\}", "0", path))
-            if path in ("/healthz", "/readyz"):
+            if path in OPEN:
                 assert answer.status_code == 200
             else:
                 assert answer.status_code == 401, (method, path)
                 assert answer.headers["www-authenticate"] == "Bearer"
                 assert answer.json()["detail"].startswith("Expected a known API key.")
+    assert OPEN == ("/", "/healthz", "/readyz")
     assert locked.get("/docs").status_code == 401
     assert locked.get("/nowhere").status_code == 401
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import hashlib
+import math
 import os
 import pathlib
 import struct
@@ -136,3 +137,25 @@ def test_what_no_fit_asks_for_is_removed_in_time(http: TestClient, settings: Set
     assert http.get(f"/v1/datasets/{dataset}").status_code == 200
     assert datasets.forget(time.time() + 60, lambda name: False) == 1
     assert http.get(f"/v1/datasets/{dataset}").status_code == 404
+
+
+def test_samples_come_back_in_degrees_as_the_brdf(http: TestClient) -> None:
+    content = b"theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value\n60,0,20,180,0.1\n30,10,40,-170,0.2\n0,0,5,90,0.3\n"
+    path = http.post("/v1/datasets", content=content, params={"quantity": "brdf_cos"}).headers["location"]
+    found = http.get(f"{path}/samples").json()
+    assert (found["count"], found["stride"], found["channels"]) == (3, 1, ["value"])
+    assert found["theta_i_deg"] == pytest.approx([60, 30, 0])
+    assert found["phi_i_deg"][:2] == pytest.approx([0, 10])
+    assert found["theta_o_deg"] == pytest.approx([20, 40, 5])
+    assert found["phi_o_deg"] == pytest.approx([180, -170, 90])
+    divided = [0.1 / math.cos(math.radians(60)), 0.2 / math.cos(math.radians(30)), 0.3]
+    assert [row[0] for row in found["values"]] == pytest.approx(divided)
+
+
+def test_of_many_samples_every_nth_comes(http: TestClient) -> None:
+    path = http.post("/v1/datasets", content=csv_file(24), params={"quantity": "brdf"}).headers["location"]
+    every, some = (http.get(f"{path}/samples", params={"limit": limit}).json() for limit in (24, 7))
+    assert (every["stride"], some["stride"], len(some["values"])) == (1, 4, 6)
+    assert some["values"] == every["values"][::4]
+    assert http.get(f"{path}/samples", params={"limit": 10_001}).status_code == 422
+    assert http.get("/v1/datasets/none/samples").json()["detail"].startswith("Expected the id of an uploaded dataset")

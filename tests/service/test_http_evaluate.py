@@ -121,3 +121,11 @@ def test_it_takes_and_gives_json_only(http: TestClient) -> None:
     assert http.post("/v1/evaluate", content=text, headers={"content-type": "text/plain"}).status_code == 415
     headers = {"content-type": "application/json", "accept": "text/csv"}
     assert http.post("/v1/evaluate", content=text, headers=headers).status_code == 406
+
+
+def test_whole_numbers_in_a_materials_json_are_numbers(http: TestClient) -> None:
+    given = bc.material("lambert(kd=1)").to_json()
+    given["values"]["lambert.kd"] = 1  # as JavaScript writes 1.0
+    answer = http.post("/v1/evaluate", json={"material": given} | ANGLES)
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["f"] == [[pytest.approx(1 / math.pi)]] * 3

@@ -409,6 +409,7 @@ def test_openapi_has_every_route_and_its_errors(http: TestClient) -> None:
         "/v1/batches/{batch_id}/table": ["get"],
         "/v1/datasets": ["post"],
         "/v1/datasets/{dataset_id}": ["get"],
+        "/v1/datasets/{dataset_id}/samples": ["get"],
         "/v1/evaluate": ["post"],
         "/v1/fits": ["get", "post"],
         "/v1/fits/{fit_id}": ["delete", "get"],

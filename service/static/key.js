@@ -1,0 +1,34 @@
+/** The key field, shown when the service asks for a key. */
+
+import { hasKey, onMissingKey, useKey } from "./api.js";
+import { at, complain } from "./dom.js";
+
+/** @type {Promise<void> | null} one question for however many requests wait for it */
+let asking = null;
+
+/** Ask for a key whenever a request needs one, and let the request go on with it. */
+export function install() {
+  onMissingKey(() => (asking ??= asked().finally(() => (asking = null))));
+}
+
+/** @returns {Promise<void>} */
+function asked() {
+  const form = at("key");
+  complain("key-error", hasKey() ? "Expected a key that this service knows. Check it, and try again." : null);
+  form.hidden = false;
+  at("docs").hidden = true; // a link sends no key
+  at("key-text").focus();
+  return new Promise((done) => {
+    form.addEventListener(
+      "submit",
+      (/** @type {Event} */ event) => {
+        event.preventDefault();
+        useKey(at("key-text").value.trim());
+        at("key-text").value = "";
+        form.hidden = true;
+        done();
+      },
+      { once: true },
+    );
+  });
+}

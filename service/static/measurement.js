@@ -1,0 +1,131 @@
+/** Step 1: a file becomes a dataset; what it is, and the questions that it leaves open. */
+
+import { ask, get, Refusal } from "./api.js";
+import { at, complain, made, shown } from "./dom.js";
+import { changed, on, state } from "./state.js";
+
+/**
+ * What a file may leave unsaid: the question, and the answers with what each means.
+ * @type {Record<string, [string, [string, string][]]>}
+ */
+const QUESTIONS = {
+  quantity: ["What are the values?", [
+    ["brdf", "BRDF, without the cosine [1/sr]"],
+    ["brdf_cos", "BRDF times cos θᵢ [1/sr]"],
+    ["reflectance_factor", "reflectance factor, 1 for a perfect diffuser"],
+  ]],
+  angle_unit: ["In what are the angles?", [["degrees", "degrees"], ["radians", "radians"]]],
+};
+
+/** Listen to the drop zone, the file field and the example's button. */
+export function install() {
+  const drop = at("drop");
+  at("file").addEventListener("change", () => at("file").files[0] && take(at("file").files[0]));
+  at("example").addEventListener("click", example);
+  for (const name of ["dragenter", "dragover"]) drop.addEventListener(name, (/** @type {DragEvent} */ event) => hover(event, true));
+  for (const name of ["dragleave", "drop"]) drop.addEventListener(name, (/** @type {DragEvent} */ event) => hover(event, false));
+  drop.addEventListener("drop", (/** @type {DragEvent} */ event) => {
+    const file = event.dataTransfer?.files[0];
+    if (file) take(file);
+  });
+  // a file that misses the zone must not replace the page
+  for (const name of ["dragover", "drop"]) window.addEventListener(name, (event) => event.preventDefault());
+  on("dataset", describe);
+}
+
+/**
+ * @param {DragEvent} event
+ * @param {boolean} over
+ */
+function hover(event, over) {
+  event.preventDefault();
+  at("drop").classList.toggle("over", over);
+}
+
+async function example() {
+  const content = await (await ask("/static/example.csv")).blob();
+  await take(new File([content], "red_linoleum.csv"), {}, "generated from published parameters with stated noise, not measured");
+}
+
+/**
+ * Upload a file with what has been declared of it so far; ask for what it does not say.
+ * @param {File} file
+ * @param {Record<string, string>} declared
+ * @param {string} remark what else is known of it
+ */
+async function take(file, declared = {}, remark = "") {
+  complain("measurement-error", null);
+  at("ask").hidden = true;
+  at("measurement-said").textContent = `Reading ${file.name} …`;
+  try {
+    const query = new URLSearchParams(declared);
+    const headers = { "content-type": "application/octet-stream" };
+    const dataset = await get(`/v1/datasets?${query}`, { method: "POST", body: file, headers });
+    at("measurement-said").textContent = `${file.name} was read${remark && `: ${remark}`}.`;
+    await show(dataset);
+  } catch (error) {
+    at("measurement-said").textContent = "";
+    const field = error instanceof Refusal ? error.field : null;
+    if (field !== null && field in QUESTIONS && !(field in declared)) question(file, declared, field);
+    else complain("measurement-error", error);
+  } finally {
+    at("file").value = ""; // so that the same file can be chosen again
+  }
+}
+
+/**
+ * @param {File} file
+ * @param {Record<string, string>} declared
+ * @param {string} field
+ */
+function question(file, declared, field) {
+  const [text, answers] = QUESTIONS[field];
+  const choices = answers.map(([value, meaning]) =>
+    made("label", { class: "check" }, made("input", { type: "radio", name: field, value, required: true }), meaning),
+  );
+  const form = at("ask");
+  form.replaceChildren(
+    made("fieldset", {}, made("legend", {}, `${file.name} does not say: ${text}`), ...choices),
+    made("button", { type: "submit", class: "primary" }, "Go on"),
+  );
+  form.onsubmit = (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    take(file, { ...declared, [field]: String(new FormData(form).get(field)) });
+  };
+  form.hidden = false;
+  form.querySelector("input").focus();
+}
+
+/**
+ * Make a dataset the page's, with the samples that are drawn.
+ * @param {import("./state.js").Dataset} dataset
+ */
+export async function show(dataset) {
+  state.dataset = dataset;
+  state.samples = null;
+  changed("dataset");
+  changed("samples");
+  state.samples = await get(`/v1/datasets/${dataset.id}/samples?limit=2000`);
+  changed("samples");
+}
+
+function describe() {
+  const about = at("about");
+  if (state.dataset === null) return about.replaceChildren();
+  const { report, bytes } = state.dataset;
+  const range = (/** @type {number[]} */ [low, high]) => (low === high ? `${shown(low)}°` : `${shown(low)}° to ${shown(high)}°`);
+  const facts = {
+    Format: `${report.format}, ${bytes.toLocaleString("en")} bytes`,
+    Samples: report.samples.toLocaleString("en"),
+    Channels: report.channels.length > 8 ? `${report.channels.length}, ${report.channels[0]} to ${report.channels.at(-1)}` : report.channels.join(", "),
+    Light: `${range(report.theta_i_deg)} from the normal`,
+    Viewer: `${range(report.theta_o_deg)} from the normal`,
+    Sample: report.azimuth_observed ? "turned, so anisotropy can be seen" : "not turned, so models stay isotropic",
+    Values: `${shown(report.value_range[0])} to ${shown(report.value_range[1])} 1/sr, from ${report.quantity}`
+      + (report.negative_values ? `; ${report.negative_values} negative` : ""),
+    Errors: report.has_sigma ? "stated for each sample" : "not stated",
+    "Left out": report.masked.length === 0 ? "nothing" : report.masked.map((/** @type {any} */ one) => `${one.count}: ${one.reason}`).join("; "),
+  };
+  const rows = Object.entries(facts).flatMap(([name, value]) => [made("dt", {}, name), made("dd", {}, value)]);
+  about.replaceChildren(made("dl", { class: "facts" }, ...rows));
+}

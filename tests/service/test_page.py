@@ -1,0 +1,300 @@
+"""The page in a browser, as people use it; needs Playwright (pip install -e '.[page]') and Chromium."""
+
+import json
+import os
+import pathlib
+import shutil
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from page_checks import LOW_CONTRASTS, UNLABELLED
+from service_cases import csv_file, measured_diffuser
+
+from brdfcore.cli.serve import background
+from brdfcore.demo import DATA
+from service import keys
+from service.settings import Settings
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs Playwright: pip install -e '.[page]'")
+CHROMIUM = os.environ.get("BRDF_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+if CHROMIUM is None:
+    pytest.skip("needs Chromium: apt-get install chromium, or its path as BRDF_CHROMIUM", allow_module_level=True)
+
+ARGUMENTS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+]
+KEY = "k" * 24
+SOLID = "document.getElementById('solid').toDataURL()"
+SOON = 30_000  # a fit and its figures on a busy machine [ms]
+SLOW = "lambert + kurt(anisotropic) + ggx + kurt"
+SLOWER = f"{SLOW} + beckmann + cook_torrance + kurt + ward"  # so that it is there to be cancelled
+REFUSED = "Failed to load resource"  # the browser's own word on an expected refusal
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright.expect.set_options(timeout=SOON)
+    with playwright.sync_playwright() as started:
+        chromium = started.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with background(Settings(data=tmp_path_factory.mktemp("page"), port=0, workers=1)) as address:
+        yield address
+
+
+def visited(browser: Any, url: str, **options: Any) -> Iterator[Any]:
+    """A page in a window of its own, that has met no error and asked no other place for anything."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900}, reduced_motion="reduce", **options)
+    context.set_default_timeout(SOON)
+    page = context.new_page()
+    said: list[str] = []
+    page.on("console", lambda message: said.append(message.text) if message.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: said.append(str(error)))
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(url)
+    yield page
+    context.close()
+    assert [line for line in said if not line.startswith(REFUSED)] == []
+    assert [one for one in asked if not one.startswith((url, "blob:", "data:"))] == []
+
+
+@pytest.fixture
+def page(browser: Any, url: str) -> Iterator[Any]:
+    yield from visited(browser, url)
+
+
+def expect(page: Any, selector: str) -> Any:
+    return playwright.expect(page.locator(selector))
+
+
+def only(page: Any, *models: str) -> None:
+    """Choose these lobes and no other."""
+    for name in ("ward_bounded", "ggx"):
+        page.set_checked(f"input[value={name}]", name in models)
+    for name in models:
+        page.check(f"input[value={name}]")
+
+
+def test_from_the_example_to_a_fit_again_by_keyboard_and_mouse(page: Any, url: str) -> None:
+    page.focus("#example")
+    page.keyboard.press("Enter")
+    expect(page, "#about").to_contain_text("222")
+    expect(page, "#about").to_contain_text("not turned, so models stay isotropic")
+    expect(page, "#start").to_have_text("Fit 2 models")
+    only(page, "ward_bounded")
+    page.fill("#text", "lambert")
+    page.click("#start")
+    expect(page, "#ranking tbody tr").to_have_count(2)
+    expect(page, "#ranking tbody tr.chosen").to_contain_text("lambert + ward_bounded(isotropic)")
+    expect(page, "#details").to_contain_text("0.1239 to 0.1264")
+    expect(page, "#details .verdict").to_contain_text("Conserves energy: the largest albedo is 0.1752")
+    expect(page, "#polar-title").to_have_text("In the plane of incidence, light at 45°: 37 measured")
+    for name in ("polar", "albedo", "residuals"):
+        page.wait_for_selector(f"#{name} .main-svg")
+    assert len(page.evaluate(SOLID)) > 5000
+    assert page.evaluate(UNLABELLED) == []
+    assert page.evaluate(LOW_CONTRASTS) == []
+
+    page.focus("#light-theta")
+    page.keyboard.press("ArrowRight")
+    expect(page, "#polar-title").to_contain_text("light at 45.5°")
+    page.check("#scale-log")
+    expect(page, "#hand-said").to_contain_text("Error (cosine_rms) 0.04929 1/sr.")
+    page.locator("#hand input").first.focus()
+    for _ in range(3):
+        page.keyboard.press("PageUp")
+    expect(page, "#hand-said").to_contain_text("fitted 0.04929 1/sr")
+    page.click("#as-fitted")
+    expect(page, "#hand-said").to_contain_text("Error (cosine_rms) 0.04929 1/sr.")
+    assert page.evaluate("document.querySelector('table').innerText").startswith("Models")
+    seen = page.evaluate(SOLID)
+    page.focus("#solid")
+    page.keyboard.press("ArrowLeft")
+    assert page.evaluate(SOLID) != seen
+
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Report", exact=True).click()
+    assert "95 % interval" in pathlib.Path(download.value.path()).read_text()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="lobes SVG").click()
+    assert "<svg" in pathlib.Path(download.value.path()).read_text()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="residuals SVG").click()
+    assert pathlib.Path(download.value.path()).read_text().startswith("<svg")
+    expect(page, "#taking").to_contain_text('client.fit("FILE", model="lambert + ward_bounded")')
+
+    page.click("#again")
+    expect(page, "#jobs .job").to_have_count(1)
+    expect(page, "#ranking tbody tr").to_have_count(1)
+    link = page.get_attribute("#permalink", "href")
+    assert link == page.url
+    assert page.evaluate("fetch(`/v1/fits/${location.hash.slice(5)}`).then((a) => a.json())")["request"]["starts"]
+
+
+def test_a_measurement_of_many_channels_from_file_to_figure(page: Any, measured: pathlib.Path) -> None:
+    page.set_input_files("#file", measured / "cornell" / "garnet_red.brdf")
+    expect(page, "#about").to_contain_text("31, 400 to 700")
+    only(page, "ward_bounded")
+    page.click("#start")
+    expect(page, "#details table tbody tr").to_have_count(3)  # one channel; the others are folded away
+    page.click("#details summary")
+    expect(page, "#details details tbody tr").to_have_count(31 + 31 + 1)
+    page.select_option("#channel", "30")
+    expect(page, "#details table tbody tr").to_have_count(3)
+    expect(page, "#details").to_contain_text("lambert.kd (700)")
+    expect(page, "#hand-said").to_contain_text("Error (cosine_rms)")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="albedo PNG").click()
+    assert pathlib.Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_dropped_file_is_asked_for_what_it_does_not_say(page: Any) -> None:
+    page.evaluate(
+        """(text) => {
+          const data = new DataTransfer();
+          data.items.add(new File([text], "plate.csv"));
+          const drop = new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true });
+          document.getElementById("drop").dispatchEvent(drop);
+        }""",
+        csv_file().decode(),
+    )
+    expect(page, "#ask legend").to_have_text("plate.csv does not say: What are the values?")
+    expect(page, "#start").to_be_disabled()
+    page.check("#ask input[value=brdf]")
+    page.click("#ask button")
+    expect(page, "#about").to_contain_text("24")
+    expect(page, "#measurement-said").to_have_text("plate.csv was read.")
+    expect(page, "#where-figure").to_be_visible()
+    expect(page, "#start").to_be_enabled()
+
+
+def test_a_bad_file_and_a_bad_model_are_told_where_they_arose(page: Any, tmp_path: pathlib.Path) -> None:
+    bad = tmp_path / "notes.txt"
+    bad.write_text("hello\n")
+    page.set_input_files("#file", bad)
+    expect(page, "#measurement-error").to_contain_text("Expected the file to be of a known format")
+    page.set_input_files("#file", DATA)
+    expect(page, "#about").to_contain_text("222")
+    expect(page, "#measurement-error").to_be_hidden()
+    only(page)
+    expect(page, "#start").to_be_disabled()
+    page.fill("#text", "lambert + wart")
+    page.click("#start")
+    expect(page, "#choose-error").to_contain_text("lambert + wart: ")
+    expect(page, "#choose-error").to_contain_text("wart")
+
+
+def test_a_fit_is_cancelled_and_another_outlives_a_reload(page: Any) -> None:
+    page.click("#example")
+    only(page)
+    page.fill("#text", f"{SLOW}\n{SLOWER}")
+    page.click("#start")
+    page.get_by_role("button", name=f"Cancel {SLOWER}", exact=True).click()
+    expect(page, ".job:nth-child(2) .note").to_contain_text("cancelled")
+    page.reload()
+    expect(page, ".job:nth-child(2) .note").to_contain_text("cancelled")
+    expect(page, "#about").to_contain_text("222")
+    expect(page, ".job:nth-child(1) .note").to_contain_text("done, loss")
+    expect(page, "#ranking tbody tr").to_have_count(1)
+    page.fill("#find-fit", "cancelled")
+    expect(page, "#fits tbody tr").to_have_count(1)
+    for text in ("Remove", "Really remove?"):
+        page.locator("#fits tbody tr").get_by_text(text).click()
+    expect(page, "#fits").to_contain_text("None of those listed")
+
+
+def test_a_failed_fit_says_why(page: Any, url: str) -> None:
+    body = {"samples": measured_diffuser(), "model": "lambert", "max_theta_deg": 0.01}
+    asked = f"""fetch("/v1/fits", {{ method: "POST", body: {json.dumps(json.dumps(body))},
+      headers: {{ "content-type": "application/json" }} }}).then((answer) => answer.json())"""
+    page.goto(f"{url}/#fit={page.evaluate(asked)['id']}")
+    expect(page, ".job .note").to_have_text("failed")
+    expect(page, ".job .error").to_contain_text("Expected")
+    expect(page, "#result").to_be_hidden()
+
+
+def test_a_choice_by_the_data_and_files_for_other_programs(page: Any) -> None:
+    page.check("#use-auto")  # offered once the contract has been read
+    page.click("#example")
+    only(page)
+    expect(page, "#start").to_have_text("Fit")
+    page.click("#start")
+    expect(page, "#details .verdict").to_contain_text("Conserves energy")
+    expect(page, "#details").to_contain_text("How it was chosen")
+    expect(page, "#taking pre >> nth=0").to_contain_text('model="auto"')
+    for name, begins in (("radiance", "# "), ("json", "{")):
+        with page.expect_download() as download:
+            page.get_by_role("button", name=name, exact=True).click()
+        assert pathlib.Path(download.value.path()).read_text().startswith(begins)
+        assert download.value.suggested_filename.startswith("fit_")
+
+
+def test_a_service_with_a_key_asks_for_it(browser: Any, tmp_path: pathlib.Path) -> None:
+    with background(Settings(data=tmp_path / "data", port=0, workers=1, api_keys=keys.hashes(KEY))) as url:
+        for page in visited(browser, url):
+            expect(page, "#key").to_be_visible()
+            for key, seen in ((KEY + "wrong", True), (KEY, False)):
+                page.fill("#key-text", key)
+                page.click("#key button")
+                if seen:
+                    expect(page, "#key-error").to_contain_text("Expected a key that this service knows.")
+            expect(page, "#key").to_be_hidden()
+            page.click("#example")
+            expect(page, "#about").to_contain_text("222")
+            only(page, "ward_bounded")
+            page.click("#start")
+            expect(page, "#details .verdict").to_contain_text("Conserves energy")
+            expect(page, "#taking").to_contain_text("api_key=KEY")
+            assert KEY not in page.content()
+            assert page.evaluate("localStorage.length") == 0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_narrow_window_scrolls_one_way_only_and_can_be_read(browser: Any, url: str, scheme: str) -> None:
+    for page in visited(browser, url, color_scheme=scheme):
+        page.set_viewport_size({"width": 390, "height": 844})
+        page.click("#example")
+        only(page)
+        page.fill("#text", "lambert + ward_bounded")
+        page.click("#start")
+        page.wait_for_selector("#residuals .main-svg")
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        assert page.evaluate(LOW_CONTRASTS) == []
+
+
+@pytest.mark.bench
+def test_the_first_view_and_a_slider_are_quick(page: Any, url: str) -> None:
+    first = page.evaluate("performance.getEntriesByType('navigation')[0].domContentLoadedEventEnd")
+    page.set_input_files("#file", DATA)
+    only(page)
+    page.fill("#text", "lambert + kurt + kurt")
+    page.click("#start")
+    page.wait_for_selector("#residuals .main-svg")
+    median = page.evaluate("""async () => {
+      const times = [], slider = document.querySelector('#hand input[name="kurt.m"]');
+      for (let k = 0; k < 21; k++) {
+        const begun = performance.now();
+        const drawn = new Promise((done) => document.getElementById("polar").once("plotly_afterplot", done));
+        slider.value = 150 + 10 * k;
+        slider.dispatchEvent(new Event("input", { bubbles: true }));
+        await drawn;
+        times.push(performance.now() - begun);
+        await new Promise((done) => setTimeout(done, 500));
+      }
+      return times.sort((a, b) => a - b)[10];
+    }""")
+    print(f"first view {first:.0f} ms; from the slider to the redrawn lobe {median:.0f} ms, median of 21")
+    assert first <= 2000
+    assert median <= 150
