@@ -75,7 +75,9 @@ class PowerCosine(Integral):
         share = (power * sine / math.pi).detach()
         bases = total[..., None]
         scale = torch.where(beyond, torch.inf, total.detach())[..., None]
-        neglected = self.error * (1 - (power * torch.sqrt(c2)).detach() / total.detach())[..., None]
+        whole, axis = total.detach(), (power * torch.sqrt(c2)).detach()
+        lit = whole > 0  # a power may underflow
+        neglected = self.error * torch.where(lit, 1 - axis / torch.where(lit, whole, 1.0), 1.0)[..., None]
         return Sums(bases, scale, None, rule.tail((share * parts.detach())[:, None, :, None]), neglected)
 
 

@@ -73,6 +73,13 @@ def test_graded_angles_go_once_round(y):
 # --- integrals -------------------------------------------------------------------------------------------------------
 
 
+def test_a_power_that_underflows_reflects_nothing_for_certain():
+    form, values = prepared("lafortune(ks=0.3, cx=-0.19, cy=-0.57, n=2949)")
+    found = bc.energy.albedo.of_form(form, values, torch.tensor([0.26, 0.15]).double(), torch.tensor(2.1), 1e-12)
+    assert found.values.tolist() == found.error.tolist() == [[0.0], [0.0]]
+    assert found.met
+
+
 def test_every_model_has_a_rule():
     assert set(bc.MODELS) == set(EXACT) | set(SINGLE) | set(PROFILES)
     assert set(EXACT) & (set(SINGLE) | set(PROFILES)) == set()
