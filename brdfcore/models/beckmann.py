@@ -12,7 +12,7 @@ isotropic lobe can be, adds ks F_back G(ci) G(co) / (pi Gbar), what that loses (
 Box: ks, f0 in [0, 1]; a, ax, ay in [1e-4, 10]; eta in [1.0001, 4] (dielectric); eta in [0.01, 20] (conductor);
 k in [0, 20].
 Reciprocal; the directional albedo is at most ks, and falls as the lobe gets rough: what the microfacets reflect more
-than once is missing. `compensated`, it is at most 1.00002 ks, and where F = 1 it is ks to 2e-5 at every angle and width
+than once is missing. `compensated`, it is at most 1.00004 ks, and where F = 1 it is ks to 4e-5 at every angle and width
 (tests/models/test_compensation.py).
 Source: Beckmann and Spizzichino 1963; Smith 1967; Walter, Marschner, Li and Torrance 2007, eqs. 25, 26; Heitz 2014,
 eqs. 83, 98, 99; sampling of visible normals: Heitz and d'Eon 2014, and the inversion's start by Jakob 2014;
