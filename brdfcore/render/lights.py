@@ -7,6 +7,7 @@ meet them and what that density is there. All broadcast over points (..., 3).
 """
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -18,7 +19,7 @@ from ._checks import Colour, Vector
 from .shapes import check_rectangle, cross, perpendicular, rectangle_distance, sphere_distance
 
 
-class Light:
+class Light(ABC):
     """What lights share: the field that holds their strength, one number or three."""
 
     strength: ClassVar[str]
@@ -34,9 +35,9 @@ class Light:
 class DeltaLight(Light):
     """A light without an extent."""
 
+    @abstractmethod
     def arriving(self, point: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """The direction to the light (..., 3), its distance (...), and the irradiance per strength (...)."""
-        raise NotImplementedError
 
 
 class AreaLight(Light):
@@ -44,17 +45,17 @@ class AreaLight(Light):
 
     strength = "radiance"
 
+    @abstractmethod
     def sample(self, point: Tensor, normal: Tensor, u: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Directions (..., 3), distances (...) and densities [1/sr] (...), 0 where the light is not seen."""
-        raise NotImplementedError
 
+    @abstractmethod
     def met(self, point: Tensor, normal: Tensor, direction: Tensor) -> tuple[Tensor, Tensor]:
         """Where rays meet the light: the distance, inf where they miss it, and the density of `sample` [1/sr]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def seen(self, origin: Tensor, direction: Tensor) -> Tensor:
         """The distance along rays to the light, (...); inf where they miss it."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

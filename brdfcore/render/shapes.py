@@ -7,6 +7,7 @@ the surface; where nothing of it does, at the poles of a sphere, it is any direc
 """
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import torch
@@ -19,7 +20,7 @@ from ._checks import Vector
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Shape:
+class Shape(ABC):
     """What shapes share: a material, as an object or a text, the tangent of its x axis, and a name for the plan."""
 
     material: Material
@@ -42,21 +43,21 @@ class Shape:
         """The direction whose part in the surface is the material's x axis."""
         return self.tangent or (0.0, 0.0, 1.0)
 
+    @abstractmethod
     def hit(self, origin: Tensor, direction: Tensor) -> Tensor:
         """The distance along rays (..., 3) to the shape, (...); inf where they miss it."""
-        raise NotImplementedError
 
+    @abstractmethod
     def normal(self, point: Tensor) -> Tensor:
         """The unit normal at points (..., 3) on the shape."""
-        raise NotImplementedError
 
+    @abstractmethod
     def contains(self, point: Vector) -> bool:
         """Whether a point lies inside."""
-        raise NotImplementedError
 
+    @abstractmethod
     def distance(self, point: Vector) -> float:
         """The distance to a point outside, or less."""
-        raise NotImplementedError
 
     def frame(self, normal: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """The axes x, y, z of the material at points of these normals (..., 3)."""
