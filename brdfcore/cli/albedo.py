@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from ._bar import with_bar
 
+if TYPE_CHECKING:
     from ..energy.albedo import Albedo
     from ..energy.tables import AlbedoTable
     from ..models.material import Material
@@ -57,7 +57,7 @@ def command(
         require_suffix(table)
         axes = axes_in_radians(dict(_axis(text) for text in axis or []))
         wanted = 1e-4 if tolerance is None else tolerance
-        result = _with_bar(lambda progress: bc.albedo_table(made, axes, wanted, progress=progress))
+        result = with_bar("table", lambda progress: bc.albedo_table(made, axes, wanted, progress=progress))
         result.save(table)
         if as_json:
             facts = {name: value for name, value in result.to_dict().items() if name != "values"}
@@ -165,16 +165,3 @@ def _axis(text: str) -> tuple[str, tuple[float, float] | None]:
             f"Expected --axis to be KEY=LOW:HIGH or KEY, got {text!r}. Write it like kurt.m=0.1:1.", field="axis"
         ) from error
     return key, (low, high) if given else None
-
-
-def _with_bar(run: "Callable[[Callable[[float], None] | None], AlbedoTable]") -> "AlbedoTable":
-    """The result of `run`, which gets a progress callback; the bar shows on a terminal's error output only."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        return run(None)
-    with Progress(TextColumn("table"), BarColumn(), TimeElapsedColumn(), console=console, transient=True) as bar:
-        task = bar.add_task("table", total=1.0)
-        return run(lambda share: bar.update(task, completed=share))

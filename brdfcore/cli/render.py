@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from ._bar import with_bar
 
-    from ..render import Image
+if TYPE_CHECKING:
+    pass
 
 
 def command(
@@ -57,7 +57,7 @@ def command(
         "met": chosen.met,
     }
     if not plan_only:
-        image = _with_bar(lambda progress: render(made, chosen, seed=seed, device=device, progress=progress))
+        image = with_bar("render", lambda progress: render(made, chosen, seed=seed, device=device, progress=progress))
         image.save(path)
         noise_found = float(image.noise.square().mean().sqrt())
         found |= {"file": str(path), "seconds": image.seconds, "samples": image.samples, "noise": noise_found}
@@ -71,16 +71,3 @@ def command(
 def _finite(x: float) -> float | None:
     """A number that JSON has; null where nothing bounds it."""
     return x if x < float("inf") else None
-
-
-def _with_bar(run: "Callable[[Callable[[float], None] | None], Image]") -> "Image":
-    """The image that `run` makes with a progress callback; the bar shows on a terminal's error output only."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        return run(None)
-    with Progress(TextColumn("render"), BarColumn(), TimeElapsedColumn(), console=console, transient=True) as bar:
-        task = bar.add_task("render", total=1.0)
-        return run(lambda share: bar.update(task, completed=share))

@@ -12,7 +12,7 @@ import torch
 
 from ..errors import InvalidValueError
 from ..models._smith import SmithLobe
-from ..models.material import Material
+from ..models.material import Material, check_material
 from .closed_forms import LOST_ERROR
 from .peak import exceeding, highest, refined
 from .probe import pairs, reciprocity
@@ -118,11 +118,7 @@ def certify(material: Material, tolerance: float = 1e-6) -> Certificate:
     what is no material, and for a tolerance that is not in (0, 0.1].
     """
     begun = time.perf_counter()
-    if not isinstance(material, Material):
-        raise InvalidValueError(
-            f"Expected material to be a Material, got {type(material).__name__}. Make one with bc.material(text).",
-            field="material",
-        )
+    check_material(material)
     if not 0 < tolerance <= 0.1:
         raise InvalidValueError(
             f"Expected tolerance to be in (0, 0.1], got {tolerance}. Leave it out for 1e-6.", field="tolerance"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+from ..errors import InvalidValueError
 from ..models.material import Material
 from ._difference import EXACT
 
@@ -81,3 +82,13 @@ def comment(material: Material, holds: str, difference: float, mark: str) -> str
     ]
     lines = [line for paragraph in paragraphs for line in textwrap.wrap(paragraph, 110, break_long_words=False)]
     return "".join(f"{mark} {line}\n" for line in lines)
+
+
+def check_channels(count: int) -> None:
+    """Raise InvalidValueError for what a renderer's colours cannot hold."""
+    if count not in (1, 3):
+        raise InvalidValueError(
+            f"Expected the material to have one channel or three, red, green and blue, got {count}. "
+            "Fit it to three channels, or export it as json.",
+            field="material",
+        )

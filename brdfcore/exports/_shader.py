@@ -9,10 +9,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from ..errors import InvalidValueError
 from ..models.form import Term
 from ..models.material import Material
 from ..models.text import Tie
+from ._export import check_channels
 from ._language import LIBRARY, Routine, number, pruned, to_glsl, to_python, used
 from ._terms import GEOMETRY, TermSource, term_source
 
@@ -49,12 +49,7 @@ class Shader:
 
     def __post_init__(self) -> None:
         channels = self.material.channels
-        if channels not in (1, 3):
-            raise InvalidValueError(
-                f"Expected the material to have one channel or three, red, green and blue, got {channels}. "
-                "Fit it to three channels, or export it as json.",
-                field="material",
-            )
+        check_channels(channels)
         _ = self._sources  # what no shader can hold is refused here
 
     @cached_property

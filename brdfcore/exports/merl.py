@@ -13,7 +13,7 @@ from ..errors import InvalidValueError
 from ..formats import merl
 from ..models.material import Material
 from ._difference import nodes
-from ._export import Export, Exporter, Orientation
+from ._export import Export, Exporter, Orientation, check_channels
 from ._symmetry import is_isotropic
 
 _CHUNK = 2**17  # bins that are evaluated at once
@@ -21,12 +21,7 @@ _CHUNK = 2**17  # bins that are evaluated at once
 
 def write(material: Material, name: str, orientation: Orientation | None) -> Export:
     """The file's bytes, 35 MB, for an isotropic, reciprocal material of one channel or three."""
-    if material.channels not in (1, 3):
-        raise InvalidValueError(
-            f"Expected the material to have one channel or three, red, green and blue, got {material.channels}. "
-            "Fit it to three channels, or export it as json.",
-            field="material",
-        )
+    check_channels(material.channels)
     for term in material.form.terms:
         if not term.model.reciprocal:
             raise InvalidValueError(

@@ -17,11 +17,10 @@ import re
 import torch
 from torch import Tensor
 
-from ..errors import InvalidValueError
 from ..models.form import Form
 from ..models.material import Material, material
 from ._difference import Nodes, nodes
-from ._export import Export, Exporter, Orientation, comment
+from ._export import Export, Exporter, Orientation, check_channels, comment
 from ._refit import POINTS, Family, Nearest, nearest
 from ._symmetry import is_isotropic
 
@@ -31,12 +30,7 @@ _X_AXIS = (1.0, 0.0, 0.0)
 
 def write(given: Material, name: str, orientation: Orientation | None) -> Export:
     """The scene description's text, for one channel or three; refitted where neither form holds the material."""
-    if given.channels not in (1, 3):
-        raise InvalidValueError(
-            f"Expected the material to have one channel or three, red, green and blue, got {given.channels}. "
-            "Fit it to three channels, or export it as json.",
-            field="material",
-        )
+    check_channels(given.channels)
     axis = " ".join(map(repr, orientation or _X_AXIS))
     at = nodes(given)
     own = _wgmd_values(given)

@@ -69,43 +69,26 @@ def fit(
     Raises SamplesError, ModelTextError, ParameterError or UnknownNameError for arguments that cannot be fitted. A fit
     that stops early returns what it has.
     """
+    keywords: dict[str, Any] = {
+        "loss": loss,
+        "optimizer": optimizer,
+        "fixed": fixed,
+        "gray": gray,
+        "per_channel": per_channel,
+        "seed": seed,
+        "bounds": bounds,
+        "starts": tuple(starts),
+        "robust": robust,
+        "robust_scale": robust_scale,
+        "max_theta": max_theta,
+        "conserve_energy": conserve_energy,
+    }
     if model == AUTO or not isinstance(model, str):
         from .selection import select  # which makes its fits here
 
-        return select(
-            samples,
-            model,
-            progress,
-            loss=loss,
-            optimizer=optimizer,
-            fixed=fixed,
-            gray=gray,
-            per_channel=per_channel,
-            seed=seed,
-            bounds=bounds,
-            starts=tuple(starts),
-            robust=robust,
-            robust_scale=robust_scale,
-            max_theta=max_theta,
-            conserve_energy=conserve_energy,
-        )
+        return select(samples, model, progress, **keywords)
     begun = time.perf_counter()
-    plan, (kept,) = planned(
-        [samples],
-        model,
-        loss=loss,
-        optimizer=optimizer,
-        fixed=fixed,
-        gray=gray,
-        per_channel=per_channel,
-        seed=seed,
-        bounds=bounds,
-        starts=starts,
-        robust=robust,
-        robust_scale=robust_scale,
-        max_theta=max_theta,
-        conserve_energy=conserve_energy,
-    )
+    plan, (kept,) = planned([samples], model, **keywords)
     say = Teller(progress)
     found = search(plan, [kept], loss, optimizer, seed, say)
     say("uncertainty", 0.95, float(found.outcome.loss[0]))

@@ -25,13 +25,18 @@ _NAME: dict[JobKind, str] = {"fit": "fit", "albedo_table": "table of albedos"}
 _PATH: dict[JobKind, str] = {"fit": "/v1/fits", "albedo_table": "/v1/albedo"}
 
 
-class Paging(BaseModel):
+class Page(BaseModel):
     """Which part of a list."""
 
     model_config = ConfigDict(extra="forbid")
 
     limit: int = Field(20, ge=1, le=100)
     cursor: int | None = Field(None, ge=1, lt=2**63, description="`next` of the page before")
+
+
+class Paging(Page):
+    """Which part of a list of jobs."""
+
     status: JobStatus | None = Field(None, description="only those of this status")
 
 

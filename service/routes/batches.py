@@ -8,7 +8,6 @@ from collections import Counter
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
 
 from brdfcore.errors import BrdfError
 from brdfcore.fitting import check
@@ -26,15 +25,6 @@ _JSON = [Depends(json_accepted)]
 _LIMIT = 2**20  # a thousand datasets and twenty models [bytes]
 _BODY = {"required": True, "content": {"application/json": {"schema": inlined(BatchRequest)}}}
 _TABLE = {"application/json": {"schema": inlined(BatchTable)}, "text/csv": {"schema": {"type": "string"}}}
-
-
-class Paging(BaseModel):
-    """Which part of a list."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    limit: int = Field(20, ge=1, le=100)
-    cursor: int | None = Field(None, ge=1, lt=2**63, description="`next` of the page before")
 
 
 @router.post(
@@ -55,7 +45,7 @@ async def submit(request: Request, response: Response) -> BatchView:
 
 
 @router.get("", dependencies=_JSON, responses=responses(406, 422))
-async def page(request: Request, paging: Annotated[Paging, Query()]) -> BatchPage:
+async def page(request: Request, paging: Annotated[_jobs.Page, Query()]) -> BatchPage:
     """Batches, newest first."""
     service = state(request)
     found = service.store.batches(paging.limit + 1, paging.cursor)
