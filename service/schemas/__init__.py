@@ -1,0 +1,58 @@
+"""The wire contract: every body that the service reads or writes, one file a resource.
+
+Needs pydantic only, so that clients import it too.
+"""
+
+from ._base import DirectionPairs
+from .batches import BatchPage, BatchRequest, BatchRow, BatchTable, BatchView
+from .datasets import DatasetSamples, DatasetView, FormatList, FormatView, InlineSamples
+from .fits import FitPage, FitRequest, FitSummary, FitView, RequestView, SamplesView
+from .jobs import FINISHED, JobKind, JobStatus, JobView, ProgressEvent, ProgressView
+from .materials import AlbedoRequest, AlbedoView, EvaluationRequest, EvaluationView, ModelList, ModelView, PresetView
+from .problems import FieldError, HealthView, Problem
+from .results import CertificateView, CostView, FitOutcome, Interval
+from .tables import TableOutcome, TablePage, TableSummary, TableView
+
+__all__ = [
+    "FINISHED",
+    "AlbedoRequest",
+    "AlbedoView",
+    "BatchPage",
+    "BatchRequest",
+    "BatchRow",
+    "BatchTable",
+    "BatchView",
+    "CertificateView",
+    "CostView",
+    "DatasetSamples",
+    "DatasetView",
+    "DirectionPairs",
+    "EvaluationRequest",
+    "EvaluationView",
+    "FieldError",
+    "FitOutcome",
+    "FitPage",
+    "FitRequest",
+    "FitSummary",
+    "FitView",
+    "FormatList",
+    "FormatView",
+    "HealthView",
+    "InlineSamples",
+    "Interval",
+    "JobKind",
+    "JobStatus",
+    "JobView",
+    "ModelList",
+    "ModelView",
+    "PresetView",
+    "Problem",
+    "ProgressEvent",
+    "ProgressView",
+    "RequestView",
+    "SamplesView",
+    "TableOutcome",
+    "TablePage",
+    "TableSummary",
+    "TableView",
+]
