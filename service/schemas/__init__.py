@@ -10,7 +10,7 @@ from .fits import FitPage, FitRequest, FitSummary, FitView, RequestView, Samples
 from .jobs import FINISHED, JobKind, JobStatus, JobView, ProgressEvent, ProgressView
 from .materials import AlbedoRequest, AlbedoView, EvaluationRequest, EvaluationView, ModelList, ModelView, PresetView
 from .problems import FieldError, HealthView, Problem
-from .results import CertificateView, CostView, FitOutcome, Interval
+from .results import CertificateView, ComparisonView, CostView, FitOutcome, Interval
 from .tables import TableOutcome, TablePage, TableSummary, TableView
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "BatchTable",
     "BatchView",
     "CertificateView",
+    "ComparisonView",
     "CostView",
     "DatasetSamples",
     "DatasetView",

@@ -1,13 +1,14 @@
 """Several models fitted to many datasets."""
 
 from datetime import datetime
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from ._base import View
 from .fits import FitOptions
 from .jobs import JobStatus
+from .results import FitStatus
 
 
 class BatchRequest(FitOptions):
@@ -32,7 +33,7 @@ class BatchRow(View):
     model: str
     fit: str = Field(description="id of the fit")
     status: JobStatus
-    fit_status: Literal["converged", "undetermined", "stopped_early"] | None
+    fit_status: FitStatus | None
     errors: dict[str, float | None] | None
     parameters: dict[str, float | list[float | None] | None] | None
     undetermined: list[str] | None

@@ -52,6 +52,7 @@ class ConservationView(View):
 
 
 Interval = tuple[float, float] | None
+FitStatus = Literal["converged", "undetermined", "stopped_early"]
 
 
 class RungView(View):
@@ -76,9 +77,7 @@ class FitOutcome(View):
     material: dict[str, Any]
     loss: str
     objective: float | None
-    status: Literal["converged", "undetermined", "stopped_early"] = Field(
-        description="undetermined: converged, but the data leave some values free"
-    )
+    status: FitStatus = Field(description="undetermined: converged, but the data leave some values free")
     message: str
     parameters: dict[str, float | list[float | None] | None]
     standard_errors: dict[str, float | list[float | None] | None]
@@ -118,7 +117,7 @@ class RankedView(View):
     model: str
     errors: dict[str, float | None]
     objective: float | None
-    status: Literal["converged", "stopped_early"]
+    status: FitStatus
     message: str
     undetermined: list[str]
     parameters: int = Field(description="free values, channels counted")

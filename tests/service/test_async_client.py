@@ -9,9 +9,8 @@ import httpx2
 import pytest
 from service_cases import KD, csv_file, measured_diffuser
 
-from service import client as module
 from service.app import create_app
-from service.client import AsyncClient, AsyncFitResult, FitFailedError, ProblemError, UnreachableError
+from service.client import AsyncClient, AsyncFitResult, FitFailedError, ProblemError, UnreachableError, persistence
 from service.settings import Settings
 
 T = TypeVar("T")
@@ -79,7 +78,7 @@ def test_many_clients_at_once(settings: Settings) -> None:
 
 
 def test_tries_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_FIRST", 0.0)
+    monkeypatch.setattr(persistence, "_FIRST", 0.0)
     tries = []
 
     def refuse(request: httpx2.Request) -> httpx2.Response:
@@ -92,5 +91,5 @@ def test_tries_end(monkeypatch: pytest.MonkeyPatch) -> None:
 
     with pytest.raises(UnreachableError, match=r"http://nowhere.*Is it running\?"):
         asyncio.run(ask())
-    assert len(tries) == module.TRIES
+    assert len(tries) == persistence.TRIES
     assert tries[0].headers["authorization"] == "Bearer key"

@@ -13,16 +13,17 @@ import httpx2
 import numpy as np
 import pytest
 import torch
-from service_cases import csv_file, measured_diffuser
+from service_cases import KD, csv_file, measured_diffuser
 from starlette.testclient import TestClient
 
 import brdfcore as bc
-from service import client as module
-from service import client_calls as calls
 from service.client import (
     Client,
     ClientError,
+    Declared,
+    Directions,
     FitFailedError,
+    FitOptions,
     FitResult,
     FitUnfinishedError,
     JobFailedError,
@@ -30,7 +31,12 @@ from service.client import (
     ProblemError,
     UnreachableError,
     WaitError,
+    persistence,
+    waiting,
 )
+from service.client import data as sent
+from service.routes.datasets import Declarations
+from service.schemas import DirectionPairs, FitRequest
 
 
 @pytest.fixture
@@ -108,6 +114,26 @@ def test_arguments_reach_the_service(client: Client) -> None:
     assert fit.result.conservation is not None
 
 
+def test_several_models_are_compared(client: Client) -> None:
+    fit = client.fit(measured_diffuser(), models=["lambert + kurt", "lambert"])
+    assert fit.comparison is not None
+    ranking = fit.comparison.ranking
+    assert ranking[0].fit.model == fit.result.model
+    assert {ranked.status for ranked in ranking} == {"converged", "undetermined"}
+    (one,) = client.fits([measured_diffuser()], models=["lambert"])
+    assert one.parameters["lambert.kd"] == pytest.approx(KD, rel=0.01)
+    with pytest.raises(ProblemError, match="Expected either model or models to be given"):
+        client.fit(measured_diffuser(), model="lambert", models=["lambert"])
+    assert client.fit(measured_diffuser(), model="lambert").comparison is None
+
+
+def test_what_may_be_asked_is_what_the_service_takes() -> None:
+    apart = {"dataset", "samples", "model", "models"}
+    assert set(FitOptions.__annotations__) - set(Declared.__annotations__) == set(FitRequest.model_fields) - apart
+    assert set(Declared.__annotations__) == set(Declarations.model_fields)
+    assert set(Directions.__annotations__) == set(DirectionPairs.model_fields)
+
+
 def test_the_report_and_the_plots_are_for_people(client: Client) -> None:
     fit = client.fit(as_samples(), model="lambert")
     assert fit.report().startswith("lambert\nconverged")
@@ -124,7 +150,7 @@ def test_a_fit_is_exported(client: Client) -> None:
 
 
 def test_many_samples_travel_as_a_file(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(calls, "INLINE_ROWS", 10)
+    monkeypatch.setattr(sent, "INLINE_ROWS", 10)
     samples = as_samples()
     fit = client.fit(samples, model="lambert")
     assert fit.view.request.samples is None
@@ -138,7 +164,7 @@ def test_what_samples_say_of_their_azimuth_travels_with_them(client: Client, mon
     samples = as_samples()
     turned = bc.Samples(samples.wi, samples.wo, samples.values, azimuth_observed=True)
     for rows in (100, 10):
-        monkeypatch.setattr(calls, "INLINE_ROWS", rows)
+        monkeypatch.setattr(sent, "INLINE_ROWS", rows)
         assert client.fit(turned, model="lambert").result.data["azimuth_observed"] is True
 
 
@@ -212,7 +238,7 @@ def test_a_fit_that_failed_or_was_cancelled_is_an_exception() -> None:
 
 def test_waiting_ends_with_its_time() -> None:
     client = scripted(lambda request: httpx2.Response(200, json=fit_view("running")))
-    with client, pytest.raises(WaitError, match=r"f1 to finish in the time given, but it is running\.") as late:
+    with client, pytest.raises(WaitError, match=r"Expected /v1/fits/f1 to be finished within ") as late:
         client.fit({"values": [1.0]}, model="lambert", timeout=0.1)
     assert isinstance(late.value, TimeoutError)
 
@@ -230,12 +256,12 @@ def test_cancelling_answers_with_the_cancelled_fit() -> None:
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pauses between the tries of a request that take no time."""
-    monkeypatch.setattr(module, "_FIRST", 0.0)
+    monkeypatch.setattr(persistence, "_FIRST", 0.0)
 
 
 def test_a_request_is_sent_again_where_the_service_is_busy_or_gone(monkeypatch: pytest.MonkeyPatch) -> None:
     pauses: list[float] = []
-    monkeypatch.setattr(module.time, "sleep", pauses.append)
+    monkeypatch.setattr(waiting.time, "sleep", pauses.append)
     seen: list[httpx2.Request] = []
 
     def answer(request: httpx2.Request) -> httpx2.Response:
@@ -359,7 +385,9 @@ def test_a_table_that_failed_or_is_not_made_is_an_exception() -> None:
         table = client.albedo_table("lambert", wait=False)
         with pytest.raises(JobUnfinishedError, match=r"Expected table f1 to have succeeded, but it is running\."):
             _ = table.result
-        with pytest.raises(WaitError, match="table f1 to finish in the time given"):
+        with pytest.raises(
+            WaitError, match=r"Expected /v1/albedo/f1 to be finished within 0\.\d+ s, but it is not\. Wait on"
+        ):
             table.wait(timeout=0.01)
         assert table.cancel().job_status == "running"
 

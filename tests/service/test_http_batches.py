@@ -136,6 +136,6 @@ def test_waiting_for_a_batch_ends_with_its_time(idle: TestClient) -> None:
     with Client("http://testserver", transport=idle._transport) as client:
         dataset = idle.post("/v1/datasets", content=csv_file(), params={"quantity": "brdf"}).json()["id"]
         made = idle.post("/v1/batches", json={"datasets": [dataset], "models": ["lambert"]}).json()
-        with pytest.raises(WaitError, match="to finish in the time given, but it runs"):
+        with pytest.raises(WaitError, match=r"to be finished within 0\.05 s, but it is not"):
             client.get_batch(made["id"]).wait(0.05)
         assert client.get_batch(made["id"]).cancel().refresh().view.finished

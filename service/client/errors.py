@@ -10,7 +10,7 @@ ClientError
 `-- WaitError (TimeoutError)    the job was not finished in the time given
 """
 
-from .schemas import Problem
+from ..schemas import Problem
 
 
 class ClientError(Exception):
