@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TextIO
 
 from .records import Attempt
+from .retries import ASK_FOR_LESS
 from .runner import Event, Runner
-from .store import ASK_FOR_LESS, JobStore
+from .store import JobStore
 
 _BUSY = 0.05  # how soon a cancelled attempt is noticed [s]
 _SWEEP = 600.0  # how often what is old is looked for [s]
@@ -105,7 +106,7 @@ class Dispatcher:
             self._runner.start(attempt)
         except Exception:
             _log.exception("the attempt %d at job %s did not start", attempt.fence, attempt.id)
-            self._store.retry(attempt, "could not be started")
+            self._store.interrupt(attempt, "could not be started")
         else:
             self._ends[attempt] = time.monotonic() + self._fit_seconds
 
@@ -136,8 +137,9 @@ class Dispatcher:
                 self._ended(job_id, event.reason)
         else:
             _log.warning("the attempt %d at job %s %s", event.attempt.fence, job_id, event.text)
-            if self._store.retry(event.attempt, event.text) == "failed":
-                self._ended(job_id, "crash")
+            again = self._store.retry if event.kind == "crashed" else self._store.interrupt
+            if again(event.attempt, event.text) == "failed":
+                self._ended(job_id, event.kind)
         self._ends.pop(event.attempt, None)
 
     def _guarded(self, action: Callable[[], None]) -> bool:

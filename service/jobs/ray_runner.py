@@ -99,9 +99,12 @@ class RayRunner:
         try:
             item: Item = self._ray.get(next(running.stream))
         except StopIteration:
-            return [Event(attempt, "died", "ended without a result")]
+            return [Event(attempt, "crashed", "ended without a result")]
+        except self._ray.exceptions.RayTaskError as error:
+            return [Event(attempt, "crashed", f"raised {type(error.cause).__name__}")]
         except self._ray.exceptions.RayError as error:
-            return [Event(attempt, "died", f"lost its process in the cluster ({type(error).__name__})")]
+            # a process that was killed and one that crashed look the same from here
+            return [Event(attempt, "interrupted", f"lost its process in the cluster ({type(error).__name__})")]
         if isinstance(item, dict):
             _written(self._data, item)
             return []

@@ -21,8 +21,8 @@ CREATE TABLE jobs (
     result    TEXT,
     error     TEXT,
     attempts  INTEGER NOT NULL DEFAULT 0,
-    restarts  INTEGER NOT NULL DEFAULT 0,
-    lease_end REAL,
+    interrupted INTEGER NOT NULL DEFAULT 0,  -- of the attempts, those that ended from outside
+    held_until  REAL NOT NULL DEFAULT 0,     -- the end of the lease, or of the pause before the next attempt
     created   REAL NOT NULL,
     started   REAL,
     finished  REAL,
@@ -46,7 +46,7 @@ CREATE INDEX jobs_by_status ON jobs (status, number);
 CREATE INDEX jobs_by_work ON jobs (work) WHERE work IS NOT NULL;
 """
 BATCH = "number, id, request, created"
-_VERSION = 2  # of the table
+_VERSION = 3  # of the table
 COLUMNS = "number, id, kind, status, request, progress, result, error, attempts, created, started, finished, reused"
 
 

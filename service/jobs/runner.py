@@ -4,6 +4,7 @@ import contextlib
 import importlib.machinery
 import multiprocessing
 import os
+import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -18,14 +19,19 @@ from . import work
 from .records import Attempt
 
 Work = Callable[[Connection, str, JobKind, bytes, int], None]
+# exit codes that an attempt has no part in: killed, by hand or for want of memory; and the fork server's own end
+_OUTSIDE = (-signal.SIGKILL, -signal.SIGTERM, -signal.SIGHUP, -signal.SIGINT, -signal.SIGQUIT, 255)
 
 
 @dataclass(frozen=True)
 class Event:
-    """A word from an attempt: JSON of progress, JSON of the result, or a sentence; after "progress" it goes on."""
+    """A word from an attempt: JSON of progress, JSON of the result, or a sentence; after "progress" it goes on.
+
+    An attempt that ends without an answer has crashed by itself, or was interrupted from outside.
+    """
 
     attempt: Attempt
-    kind: Literal["progress", "succeeded", "failed", "died"]
+    kind: Literal["progress", "succeeded", "failed", "crashed", "interrupted"]
     text: str
     reason: str = ""  # of a failure, in one word: data, memory or internal
 
@@ -111,7 +117,8 @@ class LocalRunner:
             kind, text, *reason = pipe.recv()
         except (EOFError, OSError):  # the process is gone, perhaps in the middle of a word
             process.join(5.0)
-            return Event(attempt, "died", f"ended its process with exit code {process.exitcode}")
+            code = process.exitcode
+            return Event(attempt, "interrupted" if code in _OUTSIDE else "crashed", f"ended with exit code {code}")
         return Event(attempt, kind, text, *reason)
 
 

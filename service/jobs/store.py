@@ -4,7 +4,8 @@
 A job is a fit or a table of albedos. It is queued, then running under a lease, then succeeded, failed or cancelled.
 Each claim adds 1 to `attempts`, which is also the fencing number: whoever holds an older number, or a job that is no
 longer running, is refused.
-A restart of the server ends an attempt through no fault of the job, so it is counted apart and capped apart.
+
+An attempt that ends without an answer is followed by another, as retries.py says.
 Work that has succeeded before, told by the hash of what determines its result, succeeds at once with that result.
 
 Every write is BEGIN IMMEDIATE: a deferred transaction that writes after a read fails at once when another has
@@ -35,10 +36,7 @@ from .records import (
     connect,
     prepare,
 )
-
-MOST_CRASHES = 3
-MOST_RESTARTS = 20
-ASK_FOR_LESS = "Try fewer samples, fewer axes or a simpler model."
+from .retries import COUNTED, CRASHED_OUT, INTERRUPTED_OUT, PAUSE, crashed_out, ended, interrupted_out
 
 
 class JobStore:
@@ -225,20 +223,20 @@ class JobStore:
         return bool(self._read("SELECT 1 FROM jobs WHERE kind = ? AND instr(result, ?) LIMIT 1", kind, text))
 
     def claim(self) -> Attempt | None:
-        """The oldest job that is queued or whose lease has run out, now running under a new lease."""
+        """The oldest job that is queued and need not pause, or whose lease has run out; it runs under a new lease."""
         now = self._clock()
-        due = "(status = 'queued' OR (status = 'running' AND lease_end < ?))"
+        due = "status IN ('queued', 'running') AND held_until < ?"
         if not self._read(f"SELECT 1 FROM jobs WHERE {due} LIMIT 1", now):
             return None  # an idle dispatcher takes no write lock
         with self._write() as db:
             db.execute(
                 "UPDATE jobs SET status = 'failed', error = ?, finished = ? "
-                "WHERE status = 'running' AND lease_end < ? AND attempts - restarts >= ?",
-                (_given_up("was abandoned by its worker"), now, now, MOST_CRASHES),
+                f"WHERE status = 'running' AND held_until < ? AND {INTERRUPTED_OUT}",
+                (interrupted_out("was abandoned by its worker"), now, now),
             )
             rows = db.execute(
-                "UPDATE jobs SET status = 'running', attempts = attempts + 1, lease_end = ?, progress = NULL, "
-                "started = coalesce(started, ?) "
+                "UPDATE jobs SET status = 'running', attempts = attempts + 1, held_until = ?, progress = NULL, "
+                "started = coalesce(started, ?), interrupted = interrupted + (status = 'running') "
                 f"WHERE number = (SELECT number FROM jobs WHERE {due} ORDER BY number LIMIT 1) "
                 "RETURNING id, attempts, body, kind",
                 (now + self.lease, now, now),
@@ -254,7 +252,7 @@ class JobStore:
         end = self._clock() + self.lease
         with self._write() as db:
             db.executemany(
-                "UPDATE jobs SET lease_end = ? WHERE id = ? AND attempts = ? AND status = 'running'",
+                "UPDATE jobs SET held_until = ? WHERE id = ? AND attempts = ? AND status = 'running'",
                 [(end, attempt.id, attempt.fence) for attempt in attempts],
             )
 
@@ -271,13 +269,16 @@ class JobStore:
         return self._held("status = 'failed', error = ?, finished = ?", attempt, error, self._clock())
 
     def retry(self, attempt: Attempt, what: str) -> JobStatus | None:
-        """What became of the job, queued again or failed after too many crashes; None if the attempt had lost it."""
-        held = self._held(
-            "status = iif(attempts - restarts >= ?, 'failed', 'queued'), "
-            "error = iif(attempts - restarts >= ?, ?, NULL), finished = iif(attempts - restarts >= ?, ?, NULL)",
-            attempt,
-            *(MOST_CRASHES, MOST_CRASHES, _given_up(what), MOST_CRASHES, self._clock()),
-        )
+        """What became of a job that crashed: queued again or failed; None if the attempt had lost it."""
+        return self._again(attempt, CRASHED_OUT, crashed_out(what), "held_until = 0")
+
+    def interrupt(self, attempt: Attempt, what: str) -> JobStatus | None:
+        """What became of a job that was ended from outside: queued again or failed; None if the attempt had lost it."""
+        change = f"{COUNTED}, held_until = ? + {PAUSE}"
+        return self._again(attempt, INTERRUPTED_OUT, interrupted_out(what), change, self._clock())
+
+    def _again(self, attempt: Attempt, over: str, error: str, change: str, *values: object) -> JobStatus | None:
+        held = self._held(f"{change}, {ended(over)}", attempt, *values, error, self._clock())
         job = self.get(attempt.id) if held else None
         return job.status if job else None
 
@@ -285,9 +286,8 @@ class JobStore:
         """Queue every running job again: for the one process that knows that nobody works on any of them."""
         with self._write() as db:
             db.execute(
-                "UPDATE jobs SET restarts = restarts + 1, status = iif(restarts >= ?, 'failed', 'queued'), "
-                "error = iif(restarts >= ?, ?, NULL), finished = iif(restarts >= ?, ?, NULL) WHERE status = 'running'",
-                (MOST_RESTARTS, MOST_RESTARTS, _interrupted(), MOST_RESTARTS, self._clock()),
+                f"UPDATE jobs SET held_until = 0, {COUNTED}, {ended(INTERRUPTED_OUT)} WHERE status = 'running'",
+                (interrupted_out("ended with its server"), self._clock()),
             )
 
     def cancel(self, job_id: str) -> Job | None:
@@ -331,11 +331,3 @@ class JobStore:
 
 def _job(row: Any) -> Job:
     return Job(*row)  # the table is STRICT, and _COLUMNS names the fields in order
-
-
-def _given_up(what: str) -> str:
-    return f"The job {what} in each of {MOST_CRASHES} attempts. {ASK_FOR_LESS}"
-
-
-def _interrupted() -> str:
-    return f"The server stopped during each of {MOST_RESTARTS + 1} attempts. Submit the job again once it is stable."

@@ -25,7 +25,7 @@ from brdfcore.fitting.comparison import compare
 from .. import tables
 from ..datasets import Datasets
 from ..schemas import AlbedoRequest, FitRequest, JobKind
-from .store import ASK_FOR_LESS
+from .retries import ASK_FOR_LESS
 
 _PROGRESS_EVERY = 0.1  # [s]; each word of progress becomes a write to the disk
 

@@ -21,8 +21,17 @@ def refuses(out: Connection, data: str, kind: str, body: bytes, memory: int) -> 
     out.send(("failed", "Expected something else."))
 
 
-def dies(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
+def faults(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def killed_three_times(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:
+    with (pathlib.Path(data) / "kills").open("a+") as marks:
+        marks.write("x")
+        if marks.tell() < 4:
+            marks.flush()
+            os.kill(os.getpid(), signal.SIGKILL)
+    out.send(("succeeded", "{}"))
 
 
 def dies_once(out: Connection, data: str, kind: str, body: bytes, memory: int) -> None:

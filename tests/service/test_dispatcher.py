@@ -95,12 +95,20 @@ def test_a_child_that_dies_is_retried(
     assert "exit code 7" in caplog.text
 
 
-def test_a_child_that_keeps_dying_fails_in_words(store: JobStore, tmp_path: pathlib.Path) -> None:
-    with dispatching(store, tmp_path, attempts.dies):
+def test_a_child_that_keeps_crashing_fails_in_words(store: JobStore, tmp_path: pathlib.Path) -> None:
+    with dispatching(store, tmp_path, attempts.faults):
         failed = ended(store, store.submit("{}", b""))
     assert (failed.status, failed.attempts) == ("failed", 3)
-    assert failed.error is not None
-    assert failed.error.startswith("The job ended its process with exit code -9 in each of 3 attempts.")
+    assert (failed.error or "").startswith("The job ended with exit code -11 in each of 3 attempts.")
+
+
+def test_a_child_that_is_killed_is_tried_again_after_a_pause(tmp_path: pathlib.Path) -> None:
+    store = JobStore(tmp_path / "jobs.sqlite3", lease=3600.0, clock=lambda: 50 * time.time())
+    with dispatching(store, tmp_path, attempts.killed_three_times):
+        done = ended(store, store.submit("{}", b""))
+    store.close()
+    assert (done.status, done.attempts, done.error) == ("succeeded", 4, None)
+    assert (done.finished or 0) - (done.started or 0) >= 0.5 + 1 + 2
 
 
 def test_an_oversize_fit_fails_alone(store: JobStore, tmp_path: pathlib.Path) -> None:

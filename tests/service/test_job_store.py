@@ -8,8 +8,9 @@ from collections.abc import Iterator
 import pytest
 
 from brdfcore.errors import InvalidValueError
-from service.jobs.records import Attempt
-from service.jobs.store import MOST_CRASHES, MOST_RESTARTS, JobStore
+from service.jobs.records import Attempt, Job
+from service.jobs.retries import MOST_CRASHES, MOST_INTERRUPTED
+from service.jobs.store import JobStore
 
 
 class Clock:
@@ -59,7 +60,7 @@ def test_jobs_are_claimed_in_the_order_of_their_submission(store: JobStore) -> N
     assert [claimed(store).id for _ in ids] == ids
 
 
-@pytest.mark.parametrize("word", ["progress", "succeed", "fail", "retry"])
+@pytest.mark.parametrize("word", ["progress", "succeed", "fail", "retry", "interrupt"])
 def test_a_stale_worker_is_refused(store: JobStore, clock: Clock, word: str) -> None:
     job = store.submit("{}", b"")
     stale = claimed(store)
@@ -98,53 +99,82 @@ def test_a_stale_worker_cannot_renew(store: JobStore, clock: Clock) -> None:
     assert claimed(store).fence == 3
 
 
-def test_an_abandoned_job_fails_after_its_last_attempt(store: JobStore, clock: Clock) -> None:
-    job = store.submit("{}", b"")
-    for _ in range(MOST_CRASHES):
-        claimed(store)
-        clock.now += 31
-    assert store.claim() is None
-    failed = store.get(job.id)
-    assert failed is not None
-    assert failed.status == "failed"
-    assert failed.error is not None
-    assert failed.error.startswith("The job was abandoned by its worker in each of 3 attempts.")
+def current(store: JobStore, job: Job) -> Job:
+    found = store.get(job.id)
+    assert found is not None
+    return found
 
 
-def test_a_crash_is_retried_up_to_the_cap(store: JobStore) -> None:
+def test_a_crash_is_retried_at_once_up_to_the_cap(store: JobStore) -> None:
     job = store.submit("{}", b"")
     for _ in range(MOST_CRASHES):
-        assert store.retry(claimed(store), "ended its process with exit code -9")
-    failed = store.get(job.id)
-    assert failed is not None
+        assert store.retry(claimed(store), "ended with exit code 7")
+    failed = current(store, job)
     assert (failed.status, failed.attempts) == ("failed", 3)
     assert failed.error == (
-        "The job ended its process with exit code -9 in each of 3 attempts. "
-        "Try fewer samples, fewer axes or a simpler model."
+        "The job ended with exit code 7 in each of 3 attempts. Try fewer samples, fewer axes or a simpler model."
     )
     assert store.claim() is None
 
 
-def test_restarts_are_no_crashes_but_have_a_cap_of_their_own(store: JobStore) -> None:
+def test_an_end_from_outside_is_no_crash_and_pauses_ever_longer(store: JobStore, clock: Clock) -> None:
+    job = store.submit("{}", b"")
+    pauses: list[float] = []
+    attempt = claimed(store)
+    for _ in range(MOST_INTERRUPTED - 1):
+        assert store.interrupt(attempt, "ended with exit code -9") == "queued"
+        ended = clock.now
+        while (again := store.claim()) is None:
+            clock.now += 0.25
+        attempt = again
+        pauses.append(clock.now - ended)
+    assert pauses == pytest.approx([0.5, 1, 2, 4, 8, 16, 32, *[60] * (MOST_INTERRUPTED - 8)], abs=0.26)
+    for _ in range(MOST_CRASHES - 1):  # of these it has all its attempts left
+        assert store.retry(attempt, "died") == "queued"
+        attempt = claimed(store)
+    assert store.interrupt(attempt, "ended with exit code -9") == "failed"
+    assert (current(store, job).error or "").startswith(
+        "The job was interrupted 30 times; the last attempt ended with exit code -9. Submit it again once"
+    )
+
+
+def test_a_job_that_pauses_lets_the_others_go_first(store: JobStore, clock: Clock) -> None:
+    first, second = (store.submit("{}", b"").id for _ in range(2))
+    store.interrupt(claimed(store), "was killed")
+    assert claimed(store).id == second
+    clock.now += 1
+    assert claimed(store).id == first
+
+
+def test_an_abandoned_job_is_interrupted(store: JobStore, clock: Clock) -> None:
+    job = store.submit("{}", b"")
+    for number in range(MOST_INTERRUPTED):
+        assert claimed(store).fence == number + 1
+        clock.now += 31
+    assert store.claim() is None
+    failed = current(store, job)
+    assert failed.status == "failed"
+    assert failed.error == (
+        "The job was interrupted 30 times; the last attempt was abandoned by its worker. Submit it again once what "
+        "computes is stable and has the memory for it."
+    )
+
+
+def test_restarts_are_no_crashes_and_need_no_pause(store: JobStore) -> None:
     job = store.submit("{}", b"")
     waiting = store.submit("{}", b"")
-    for _ in range(MOST_RESTARTS):
+    for _ in range(MOST_INTERRUPTED - 1):
         assert claimed(store).id == job.id
         store.reclaim()
-        again = store.get(job.id)
-        assert again is not None
-        assert again.status == "queued"
+        assert current(store, job).status == "queued"
     for _ in range(MOST_CRASHES - 1):
-        store.retry(claimed(store), "died")
-        again = store.get(job.id)
-        assert again is not None
-        assert again.status == "queued"
+        assert store.retry(claimed(store), "died") == "queued"
     claimed(store)
     store.reclaim()
-    failed = store.get(job.id)
-    assert failed is not None
+    failed = current(store, job)
     assert failed.status == "failed"
-    assert failed.error == ("The server stopped during each of 21 attempts. Submit the job again once it is stable.")
+    assert failed.error is not None
+    assert failed.error.startswith("The job was interrupted 30 times; the last attempt ended with its server.")
     assert claimed(store).id == waiting.id
 
 
