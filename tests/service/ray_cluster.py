@@ -46,9 +46,6 @@ def main(folder: pathlib.Path, fits: int, kills: int) -> None:
             accepted = [fit.id for fit in submitted]
             while killed < kills:
                 time.sleep(rng.uniform(0.0, 0.5))
-                ended = sum(client.get(fit_id).job_status == "succeeded" for fit_id in accepted)
-                if 2 * killed > ended:  # a fit that is killed three times is given up: kill on, but not the same ones
-                    continue
                 for pid in rng.sample(found, 1) if (found := workers()) else ():
                     with contextlib.suppress(ProcessLookupError):
                         os.kill(pid, signal.SIGKILL)
@@ -63,6 +60,7 @@ def main(folder: pathlib.Path, fits: int, kills: int) -> None:
         told = {
             "killed": killed,
             "statuses": [view.status for view in ends],
+            "attempts": [view.attempts for view in ends],
             "errors": [view.error for view in ends if view.error],
             "committed_once": sorted(commits) == sorted(v.id for v in ends if v.status == "succeeded"),
         }

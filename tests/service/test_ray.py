@@ -12,6 +12,7 @@ import pytest
 
 from brdfcore.errors import InvalidValueError
 from service.jobs.ray_runner import RayRunner
+from service.jobs.retries import MOST_INTERRUPTED
 
 HERE = pathlib.Path(__file__).parent
 
@@ -41,6 +42,8 @@ def test_fifty_fits_survive_twenty_kills_and_a_new_server(tmp_path: pathlib.Path
     told = json.loads(ran.stdout.splitlines()[-1])
     assert told["killed"] == 20
     assert told["committed_once"]
-    assert told["statuses"].count("succeeded") >= 48, told["errors"]  # three kills of one fit end it, with a sentence
-    assert all("in each of 3 attempts" in error for error in told["errors"])
-    assert len(told["statuses"]) == 50
+    assert told["errors"] == []
+    assert told["statuses"] == ["succeeded"] * 50
+    # no fit can be given up: 20 kills and a new server are fewer ends from outside than it takes
+    assert 21 < MOST_INTERRUPTED
+    assert sum(told["attempts"]) >= 50 + 20 // 2  # some kills hit a process that had just answered
