@@ -31,6 +31,7 @@ from .client_errors import (
     UnreachableError,
     WaitError,
 )
+from .client_renders import AsyncRenderResult, RenderResult, Scene, rendered
 from .client_results import (
     AsyncBatchResult,
     AsyncFitResult,
@@ -54,6 +55,7 @@ from .schemas import (
     ModelList,
     ModelView,
     Problem,
+    RenderView,
     TableView,
 )
 
@@ -61,6 +63,7 @@ __all__ = [
     "AsyncBatchResult",
     "AsyncClient",
     "AsyncFitResult",
+    "AsyncRenderResult",
     "AsyncTableResult",
     "BatchResult",
     "Client",
@@ -73,6 +76,7 @@ __all__ = [
     "JobFailedError",
     "JobUnfinishedError",
     "ProblemError",
+    "RenderResult",
     "TableResult",
     "UnreachableError",
     "WaitError",
@@ -296,6 +300,29 @@ class Client(_Shared):
         """The table of that id as it stands."""
         return TableResult(self._run, self._run(calls.read(TableView, "GET", f"/v1/albedo/{table_id}")))
 
+    def render(
+        self,
+        scene: Scene,
+        tolerance: float = 1e-3,
+        *,
+        samples: int | None = None,
+        noise: float | None = None,
+        seed: int = 0,
+        wait: bool = True,
+        timeout: float | None = None,
+        progress: Tell | None = None,
+    ) -> RenderResult:
+        """The image of a scene: the name of a shipped one, its JSON, or an object like brdfcore.render.Scene.
+
+        With wait=True it is finished on return; raises JobFailedError, and WaitError after `timeout` s.
+        """
+        asked = {"tolerance": tolerance, "samples": samples, "noise": noise, "seed": seed}
+        return RenderResult(self._run, self._run(rendered(scene, asked, wait, timeout, progress)))
+
+    def get_render(self, render_id: str) -> RenderResult:
+        """The render of that id as it stands."""
+        return RenderResult(self._run, self._run(calls.read(RenderView, "GET", f"/v1/renders/{render_id}")))
+
     def _run(self, call: Call[_T]) -> _T:
         """The result of a call, its steps taken one after the other."""
         answer: Any = None
@@ -453,6 +480,26 @@ class AsyncClient(_Shared):
     async def get_table(self, table_id: str) -> AsyncTableResult:
         """The table of that id as it stands."""
         return AsyncTableResult(self._run, await self._run(calls.read(TableView, "GET", f"/v1/albedo/{table_id}")))
+
+    async def render(
+        self,
+        scene: Scene,
+        tolerance: float = 1e-3,
+        *,
+        samples: int | None = None,
+        noise: float | None = None,
+        seed: int = 0,
+        wait: bool = True,
+        timeout: float | None = None,
+        progress: Tell | None = None,
+    ) -> AsyncRenderResult:
+        """The image of a scene, as `Client.render` gives it."""
+        asked = {"tolerance": tolerance, "samples": samples, "noise": noise, "seed": seed}
+        return AsyncRenderResult(self._run, await self._run(rendered(scene, asked, wait, timeout, progress)))
+
+    async def get_render(self, render_id: str) -> AsyncRenderResult:
+        """The render of that id as it stands."""
+        return AsyncRenderResult(self._run, await self._run(calls.read(RenderView, "GET", f"/v1/renders/{render_id}")))
 
     async def _run(self, call: Call[_T]) -> _T:
         answer: Any = None

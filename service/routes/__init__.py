@@ -1,6 +1,6 @@
 """The routes, one file a resource."""
 
-from . import albedo, batches, datasets, evaluate, events, export, fits, formats, health, models, page, plots
+from . import albedo, batches, datasets, evaluate, events, export, fits, formats, health, models, page, plots, renders
 
 ROUTERS = (
     datasets.router,
@@ -10,6 +10,7 @@ ROUTERS = (
     plots.router,
     export.router,
     albedo.router,
+    renders.router,
     evaluate.router,
     models.router,
     formats.router,

@@ -10,6 +10,7 @@ from .fits import FitPage, FitRequest, FitSummary, FitView, RequestView, Samples
 from .jobs import FINISHED, JobKind, JobStatus, JobView, ProgressEvent, ProgressView
 from .materials import AlbedoRequest, AlbedoView, EvaluationRequest, EvaluationView, ModelList, ModelView, PresetView
 from .problems import FieldError, HealthView, Problem
+from .renders import EffectView, PlanView, RenderOutcome, RenderPage, RenderRequest, RenderSummary, RenderView
 from .results import CertificateView, CostView, FitOutcome, Interval
 from .tables import TableOutcome, TablePage, TableSummary, TableView
 
@@ -27,6 +28,7 @@ __all__ = [
     "DatasetSamples",
     "DatasetView",
     "DirectionPairs",
+    "EffectView",
     "EvaluationRequest",
     "EvaluationView",
     "FieldError",
@@ -45,10 +47,16 @@ __all__ = [
     "JobView",
     "ModelList",
     "ModelView",
+    "PlanView",
     "PresetView",
     "Problem",
     "ProgressEvent",
     "ProgressView",
+    "RenderOutcome",
+    "RenderPage",
+    "RenderRequest",
+    "RenderSummary",
+    "RenderView",
     "RequestView",
     "SamplesView",
     "TableOutcome",
