@@ -164,6 +164,11 @@ class _Shared:
         body = {"theta_deg": calls.plain(theta_deg), "phi_deg": phi_deg, "tolerance": tolerance}
         return calls.read(AlbedoView, "POST", "/v1/albedo", json={"material": calls.material_of(material), **body})
 
+    @staticmethod
+    def _sphere(material: Material, channels: Sequence[str] | None, size: int) -> Call[bytes]:
+        body = {"material": calls.material_of(material), "channels": calls.plain(channels), "size": size}
+        return calls.content("POST", "/v1/sphere", json=body)
+
 
 class Client(_Shared):
     """The service at a URL; a context manager. `transport` takes the place of the network, for tests."""
@@ -280,6 +285,10 @@ class Client(_Shared):
     def albedo(self, material: Material, theta_deg: Any, phi_deg: float = 0.0, tolerance: float = 1e-6) -> AlbedoView:
         """The directional albedos of a material, given as in `evaluate`, for polar angles [degrees]."""
         return self._run(self._albedo(material, theta_deg, phi_deg, tolerance))
+
+    def sphere(self, material: Material, channels: Sequence[str] | None = None, size: int = 160) -> bytes:
+        """A lit sphere of a material, given as in `evaluate`, as a PNG file; `channels` give it its colour."""
+        return self._run(self._sphere(material, channels, size))
 
     def albedo_table(
         self,
@@ -464,6 +473,10 @@ class AsyncClient(_Shared):
     ) -> AlbedoView:
         """The directional albedos of a material for polar angles [degrees]."""
         return await self._run(self._albedo(material, theta_deg, phi_deg, tolerance))
+
+    async def sphere(self, material: Material, channels: Sequence[str] | None = None, size: int = 160) -> bytes:
+        """A lit sphere of a material as the bytes of a PNG file, as `Client.sphere` gives it."""
+        return await self._run(self._sphere(material, channels, size))
 
     async def albedo_table(
         self,

@@ -1,6 +1,21 @@
 """The routes, one file a resource."""
 
-from . import albedo, batches, datasets, evaluate, events, export, fits, formats, health, models, page, plots, renders
+from . import (
+    albedo,
+    batches,
+    datasets,
+    evaluate,
+    events,
+    export,
+    fits,
+    formats,
+    health,
+    models,
+    page,
+    plots,
+    renders,
+    sphere,
+)
 
 ROUTERS = (
     datasets.router,
@@ -12,6 +27,7 @@ ROUTERS = (
     albedo.router,
     renders.router,
     evaluate.router,
+    sphere.router,
     models.router,
     formats.router,
     health.router,

@@ -8,7 +8,16 @@ from .batches import BatchPage, BatchRequest, BatchRow, BatchTable, BatchView
 from .datasets import DatasetSamples, DatasetView, FormatList, FormatView, InlineSamples
 from .fits import FitPage, FitRequest, FitSummary, FitView, RequestView, SamplesView
 from .jobs import FINISHED, JobKind, JobStatus, JobView, ProgressEvent, ProgressView
-from .materials import AlbedoRequest, AlbedoView, EvaluationRequest, EvaluationView, ModelList, ModelView, PresetView
+from .materials import (
+    AlbedoRequest,
+    AlbedoView,
+    EvaluationRequest,
+    EvaluationView,
+    ModelList,
+    ModelView,
+    PresetView,
+    SphereRequest,
+)
 from .problems import FieldError, HealthView, Problem
 from .renders import EffectView, PlanView, RenderOutcome, RenderPage, RenderRequest, RenderSummary, RenderView
 from .results import CertificateView, CostView, FitOutcome, Interval
@@ -59,6 +68,7 @@ __all__ = [
     "RenderView",
     "RequestView",
     "SamplesView",
+    "SphereRequest",
     "TableOutcome",
     "TablePage",
     "TableSummary",

@@ -381,6 +381,12 @@ def test_a_scene_is_rendered_and_fetched(client: Client) -> None:
         made.refresh()
 
 
+def test_a_sphere_has_the_colour_of_its_channels(client: Client) -> None:
+    red = "lambert(kd=[0.6, 0.1, 0.1])"
+    assert client.sphere(red, ["450", "550", "650"]) != client.sphere(red)
+    assert client.sphere(bc.material(red), size=32) == client.sphere(red, ["r", "g", "b"], 32)
+
+
 def test_a_render_that_is_not_made_is_an_exception() -> None:
     request = {"scene": "kurt_figure_12", "tolerance": 1e-3, "samples": 4, "noise": None, "seed": 0}
     with scripted(lambda _: httpx2.Response(202, json=fit_view("running", request=request))) as client:

@@ -430,6 +430,7 @@ def test_openapi_has_every_route_and_its_errors(http: TestClient) -> None:
         "/v1/renders/{render_id}/events": ["get"],
         "/v1/renders/{render_id}/image.npy": ["get"],
         "/v1/renders/{render_id}/image.png": ["get"],
+        "/v1/sphere": ["post"],
     }
     submit = paths["/v1/fits"]["post"]
     assert "samples" in submit["requestBody"]["content"]["application/json"]["schema"]["properties"]
