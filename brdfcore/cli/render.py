@@ -3,14 +3,11 @@
 import dataclasses
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from ._bar import with_bar
-
-if TYPE_CHECKING:
-    pass
 
 
 def command(
@@ -51,11 +48,7 @@ def command(
     chosen = plan(made, tolerance, force, bounces)
     if not as_json:
         typer.echo(str(chosen))
-    found: dict[str, Any] = {
-        "effects": [vars(effect) | {"error": _finite(effect.error)} for effect in chosen.effects],
-        "error": _finite(chosen.error),
-        "met": chosen.met,
-    }
+    found = chosen.to_dict()
     if not plan_only:
         image = with_bar("render", lambda progress: render(made, chosen, seed=seed, device=device, progress=progress))
         image.save(path)
@@ -66,8 +59,3 @@ def command(
             typer.echo(f"{path}: {image.seconds:.1f} s, {sampled}")
     if as_json:
         typer.echo(json.dumps(found, indent=2, allow_nan=False))
-
-
-def _finite(x: float) -> float | None:
-    """A number that JSON has; null where nothing bounds it."""
-    return x if x < float("inf") else None

@@ -8,6 +8,7 @@ Spheres, planes and rectangles with the library's own materials, and lights with
 meshes, and the frame rates of a graphics card.
 """
 
+from .colours import to_rgb
 from .effects import Effect, Plan
 from .image import Image
 from .lights import Directional, Dome, Point, RectangleLight, SphereLight
@@ -15,6 +16,7 @@ from .plan import everything, plan
 from .progressive import render
 from .scene import LIGHTS, SCENES, SHAPES, Camera, Scene
 from .shapes import Plane, Rectangle, Sphere
+from .sphere import lit_sphere
 
 __all__ = [
     "LIGHTS",
@@ -34,6 +36,8 @@ __all__ = [
     "Sphere",
     "SphereLight",
     "everything",
+    "lit_sphere",
     "plan",
     "render",
+    "to_rgb",
 ]

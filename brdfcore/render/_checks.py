@@ -1,6 +1,7 @@
 """What every part of a scene checks: numbers, vectors and colours, each with one sentence that names the field."""
 
 import math
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -90,4 +91,5 @@ def located(error: BrdfError, where: str) -> BrdfError:
 
 
 def _finite(x: object) -> bool:
-    return isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x)
+    # compared, because a whole number may be too large for math.isfinite
+    return isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= sys.float_info.max
