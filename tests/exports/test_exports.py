@@ -70,6 +70,15 @@ def test_a_refits_stated_difference_is_right(text):
     assert at.difference(radiance._f(made.content, at)) == pytest.approx(made.difference, rel=0.02)
 
 
+@pytest.mark.parametrize("name", ["radiance", "merl", "mitsuba"])
+def test_gray_is_three_equal_channels(name, small_tables):
+    """A gray material and the same one in three equal channels are as far from what a file of colours holds."""
+    gray = bc.material("lambert(kd=0.1) + kurt(ks=0.6, f0=0.3, m=0.2)")
+    coloured = bc.material("lambert(kd=[0.1, 0.1, 0.1]) + kurt(ks=0.6, f0=0.3, m=0.2)")
+    expected = bc.export(coloured, name).difference
+    assert bc.export(gray, name).difference == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
 def test_the_difference_is_its_definition():
     """Against a product rule over the hemispheres, for two smooth materials."""
     ours, other = bc.material("lambert(kd=0.3) + kurt(m=0.6, alpha=0)"), bc.material("lambert(kd=0.4)")
@@ -112,6 +121,15 @@ def test_a_path_gets_the_content(name, tmp_path, small_tables):
     assert path.read_bytes() == made.to_bytes()
     if name in ("radiance", "mitsuba"):
         assert "brdf_7_red_paint" in made.content
+
+
+def test_a_file_may_be_named_like_a_form_of_radiance(tmp_path):
+    material = bc.material("ashikhmin_shirley(n=300)")
+    expected = bc.export(material, "radiance")
+    assert "void ashik2 brdf\n" in expected.content
+    made = bc.export(material, "radiance", tmp_path / "WGMDfunc.rad")
+    assert "void ashik2 WGMDfunc\n" in made.content
+    assert made.difference == expected.difference
 
 
 def test_json_reads_back():
