@@ -132,6 +132,11 @@ def test_a_file_may_be_named_like_a_form_of_radiance(tmp_path):
     assert made.difference == expected.difference
 
 
+def test_an_orientation_may_be_an_array():
+    made = bc.export(ANY, "radiance", orientation=np.array([0, 0.6, 0.8]))
+    assert "\n    void 0.0 0.6 0.8 .\n" in made.content
+
+
 def test_json_reads_back():
     material = bc.material(GLOSSY)
     read = bc.Material.from_json(json.loads(bc.export(material, "json").content))
@@ -149,7 +154,11 @@ ANY = bc.material("lambert")
 REFUSED = [
     ("glsl", ANY, {}, UnknownNameError, r"Expected format to be a known name, got 'glsl'\. .*brdf_explorer"),
     ("json", ANY, {"orientation": (0.0, 1.0, 0.0)}, InvalidValueError, r"orientation to be left out for json"),
-    ("radiance", ANY, {"orientation": (0.0, 0.0, 0.0)}, InvalidValueError, r"orientation to be a direction"),
+    *(
+        ("radiance", ANY, {"orientation": axis}, InvalidValueError, r"orientation to be a direction of three numbers")
+        for axis in ((0.0, 0.0, 0.0), (1.0, 2.0), (1e308, 1e308, 0.0), (math.nan, 0.0, 1.0), ("x", 0, 0), 5)
+    ),
+    ("json", "lambert", {}, InvalidValueError, "Expected material to be a Material, got str. Make one with bc.mater"),
     *(
         (name, bc.material("lambert(kd=[0.1, 0.2, 0.3, 0.4])"), {}, InvalidValueError, "one channel or three.* got 4")
         for name in bc.EXPORTS
