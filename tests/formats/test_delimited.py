@@ -274,7 +274,7 @@ def test_columns_have_to_fit_the_file(write: Write) -> None:
 @pytest.mark.parametrize(("name", "off"), [("chassis_brdf", 2), ("solar_array_brdf", 2)])
 def test_real_satellites_peak_at_the_mirror_direction(name: str, off: float, measured: Path) -> None:
     path = measured / "satellite" / f"{name}.csv"
-    with pytest.raises(FormatError, match="for a table without a header row, pass columns"):
+    with pytest.raises(FormatError, match="For a table without a header row, pass columns"):
         read(path)
     samples = read(path, quantity="brdf", columns="theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value")
     assert len(samples) > 700
