@@ -171,5 +171,5 @@ def test_channels_that_would_not_read_back_are_not_written(kind: str, tmp_path: 
     samples = Samples(torch.tensor([[0.0, 0.0, 1.0]]), torch.tensor([[0.0, 0.0, 1.0]]), [[1.0, 2.0]], ("ir", "uv"))
     write = FORMATS[kind].write
     assert write is not None
-    with pytest.raises(FormatError, match="value columns to be value, or r, g, b"):
+    with pytest.raises(FormatError, match="channels to be value, or r, g, b, or wavelengths in nm for a table, got"):
         write(samples, tmp_path / "x")

@@ -103,6 +103,15 @@ def test_one_sigma_serves_every_channel(write: Write) -> None:
     assert sigma.tolist() == [[0.5, 0.5, 0.5]]
 
 
+def test_what_was_not_measured_has_no_sigma(write: Write) -> None:
+    text = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b,sigma_r,sigma_g,sigma_b\n{}45,0,45,180,1,2,3,.1,.2,.3\n"
+    for row in ("45,0,10,180,,,,,,\n", "45,0,10,180,1,,3,.1,,.3\n"):
+        samples = read(write(text.format(row)), quantity="brdf")
+        assert samples.masked == (Masked("a value's cell is empty", 1),)
+        assert samples.sigma is not None
+        assert samples.sigma.tolist() == [[0.1, 0.2, 0.3]]
+
+
 def test_empty_values_and_horizon_rows_are_masked_with_reason_and_count(write: Write) -> None:
     rows = "45,0,45,180,1,,3,.1,.1,.1,1\n45,0,90,180,1,2,3,.1,.1,.1,1\n-90,0,0,0,1,2,3,.1,.1,.1,1\n"
     samples = read(write(CSV + rows))
