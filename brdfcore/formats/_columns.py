@@ -44,7 +44,7 @@ def samples_of(
     empty = np.isnan(rows)
     unmeasured = empty[:, header.values].any(-1)
     empty[:, header.values] = False
-    empty[np.ix_(unmeasured, header.sigma)] = False  # the row is masked, and its sigma with it
+    empty[:, header.sigma] &= ~unmeasured[:, None]  # the row is masked, and its sigma with it
     if empty.any():
         row, column = (int(k) for k in np.argwhere(empty)[0])
         name = header.names[column]

@@ -242,9 +242,7 @@ def test_write_csv_writes_round_degrees_as_such(tmp_path: Path) -> None:
 
 def test_write_csv_refuses_what_would_not_read_back(tmp_path: Path) -> None:
     samples = Samples.from_angles(30, 10, 60, 190, [[0.1, 0.2]], "degrees")
-    with pytest.raises(
-        FormatError, match=r"value columns to be value, or r, g, b, or distinct wavelengths .* got c0, c1"
-    ):
+    with pytest.raises(FormatError, match=r"channels to be value, or r, g, b, or wavelengths .* got c0, c1\. Write an"):
         write_csv(samples, tmp_path / "out.csv")
     named = Samples(samples.wi, samples.wo, samples.values, ("400", "500"))
     for comments in ({"quantity": "brdf"}, {"note": "two\nlines"}, {"no name": "x"}):
