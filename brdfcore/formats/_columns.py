@@ -42,9 +42,9 @@ def samples_of(
     measured_quantity = declared("quantity", QUANTITIES, stated.get("quantity"), quantity, source.declare_quantity)
     units = {name: _unit(name, header, stated.get("angle_unit"), angle_unit, source) for name in header.units}
     empty = np.isnan(rows)
-    unmeasured = empty[:, header.values].any(-1)
+    measured = ~np.any(empty[:, header.values], axis=-1, keepdims=True)
     empty[:, header.values] = False
-    empty[:, header.sigma] &= ~unmeasured[:, None]  # the row is masked, and its sigma with it
+    empty[:, header.sigma] &= measured  # the row is masked, and its sigma with it
     if empty.any():
         row, column = (int(k) for k in np.argwhere(empty)[0])
         name = header.names[column]
