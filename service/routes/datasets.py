@@ -13,7 +13,7 @@ from brdfcore.energy._described import finite
 from brdfcore.errors import BrdfError
 from brdfcore.formats.samples import angles
 
-from ..errors import ProblemError, responses
+from ..errors import WRITES, ProblemError, responses
 from ..schemas import DatasetSamples, DatasetView
 from ..state import State, state
 from ._http import chunks, json_accepted
@@ -38,7 +38,7 @@ class Declarations(BaseModel):
 @router.post(
     "",
     status_code=201,
-    responses={200: {"model": DatasetView, "description": "known"}, **responses(406, 408, 413, 415, 422)},
+    responses={200: {"model": DatasetView, "description": "known"}, **responses(406, 408, 413, 415, 422, *WRITES)},
     openapi_extra={"requestBody": _ANY_BYTES},
 )
 async def upload(request: Request, response: Response, declared: Annotated[Declarations, Query()]) -> DatasetView:
