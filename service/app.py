@@ -100,7 +100,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             store.close()
 
     summary = "Reflectance models fitted to measurements, with intervals, errors and lobe plots."
-    app = _App(title="brdfcore", version=bc.__version__, summary=summary, lifespan=running)
+    app = _App(
+        title="brdfcore", version=bc.__version__, summary=summary, lifespan=running, docs_url=None, redoc_url=None
+    )
     app.state.ending = lambda: False
     app.state.metrics, app.state.settings = metrics, chosen
     errors.install(app)

@@ -1,6 +1,6 @@
 """The routes, one file a resource."""
 
-from . import albedo, batches, datasets, evaluate, events, export, fits, formats, health, models, page, plots
+from . import albedo, batches, datasets, docs, evaluate, events, export, fits, formats, health, models, page, plots
 
 ROUTERS = (
     datasets.router,
@@ -15,4 +15,5 @@ ROUTERS = (
     formats.router,
     health.router,
     page.router,
+    docs.router,
 )

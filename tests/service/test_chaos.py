@@ -24,17 +24,17 @@ def test_a_hundred_kills_lose_nothing(tmp_path: pathlib.Path) -> None:
         db.executescript(COUNTING)
     while kills:
         with server(data, workers=2) as (process, client):
+            for _ in range(5):
+                accepted.append(client.fit(measured_diffuser(200), wait=False, seed=len(accepted), **SLOW).id)
             while kills:
-                while len(accepted) < JOBS and len(client.recent(status="queued")) < 4:
-                    fit = client.fit(measured_diffuser(200), wait=False, seed=len(accepted), **SLOW)
-                    accepted.append(fit.id)
-                time.sleep(rng.uniform(0.0, 0.5))
                 kill = kills.pop()
                 if kill == "server":
+                    time.sleep(rng.uniform(0.0, 0.5))
                     process.kill()
                     process.wait()
                     break
                 until(lambda: client.recent(status="running"), seconds=120)
+                time.sleep(rng.uniform(0.0, 0.5))
                 workers = [pid for pid in session_ids(process.pid) if pid != process.pid]
                 # mostly the newest, an attempt; else any, the fork server among them, which takes seconds to come back
                 for pid in [max(workers) if rng.random() < 0.8 else rng.choice(workers)] if workers else ():
