@@ -57,8 +57,9 @@ def _operation(method: str, path: str, operation: Mapping[str, Any], url: str) -
     ]
     for content in operation.get("requestBody", {}).get("content", {}).values():
         required = content["schema"].get("required", ())
-        fields = content["schema"].get("properties", {}).items()
-        given += [(name, "body", schema, name in required) for name, schema in fields]
+        for name, schema in content["schema"].get("properties", {}).items():
+            given.append((name, "body", schema, name in required))
+            given += [(f"{name}.{part}", "body", inner, False) for part, inner in _inner(schema).items()]
     if given:
         head = "<tr><th>name</th><th>in</th><th>what</th><th></th></tr>"
         rows = "".join(_row(name, schema, where, required=required) for name, where, schema, required in given)
@@ -94,6 +95,14 @@ def _row(name: str, schema: Mapping[str, Any], where: str | None = None, *, requ
     return f"<tr>{''.join(cells)}</tr>"
 
 
+def _inner(schema: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a field that is an object, or may be one."""
+    found: dict[str, Any] = {}
+    for part in (schema, *schema.get("anyOf", ())):
+        found |= part.get("properties", {})
+    return found
+
+
 def _type(schema: Mapping[str, Any]) -> str:
     """What values a schema has, in words."""
     if "$ref" in schema:
@@ -107,17 +116,25 @@ def _type(schema: Mapping[str, Any]) -> str:
     kind = schema.get("type", "bytes" if schema.get("format") == "binary" else "any")
     if kind == "array":
         parts = schema.get("prefixItems") or [schema.get("items", {})]
-        return f"list of {', '.join(_type(part) for part in parts)}{_range(schema, 'minItems', 'maxItems')}"
+        return f"list{_range(schema, 'minItems', 'maxItems')} of {', '.join(_type(part) for part in parts)}"
     if kind == "object" and isinstance(schema.get("additionalProperties"), dict):
         return f"object of {_type(schema['additionalProperties'])}"
-    length = _range(schema, "minLength", "maxLength")
-    return f"{kind}{_range(schema, 'minimum', 'maximum')}{f'{length} characters' if length else ''}"
+    if kind == "string":
+        return f"string{_range(schema, 'minLength', 'maxLength', ' characters')}"
+    return f"{kind}{_range(schema, 'minimum', 'maximum')}"
 
 
-def _range(schema: Mapping[str, Any], low: str, high: str) -> str:
-    names = ((low, "from"), ("exclusiveMinimum", "above"), (high, "to"), ("exclusiveMaximum", "below"))
-    said = [f"{word} {schema[name]}" for name, word in names if name in schema]
-    return f", {' '.join(said)}" if said else ""
+def _range(schema: Mapping[str, Any], low: str, high: str, unit: str = "") -> str:
+    """What a schema says of sizes, in brackets."""
+    least, most = schema.get(low), schema.get(high)
+    if least is not None and most is not None:
+        said = [str(least) if least == most else f"{least} to {most}"]
+    else:
+        said = [f"{least} or more"] if least is not None else [f"at most {most}"] if most is not None else []
+    if schema.get("type") in ("integer", "number"):
+        words = (("exclusiveMinimum", "above"), ("exclusiveMaximum", "below"))
+        said = [f"{word} {schema[name]}" for name, word in words if name in schema] + said
+    return f" ({', '.join(said)}{unit})" if said else ""
 
 
 def _answered(answer: Mapping[str, Any]) -> str:

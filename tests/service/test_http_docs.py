@@ -52,7 +52,7 @@ def test_every_operation_and_every_answer_is_on_it(http: TestClient, read: Read)
     codes = {text for tag, text in read.texts if tag == "code"}
     assert codes >= set(document["paths"])
     assert codes >= {p["name"] for op in operations for p in op.get("parameters", ())}
-    assert codes >= {"samples", "conserve_energy", "theta_deg", "datasets"}  # fields of bodies
+    assert codes >= {"samples.theta_i_deg", "conserve_energy", "theta_deg", "datasets"}  # fields of bodies
 
 
 def test_nothing_of_it_comes_from_elsewhere(http: TestClient, read: Read) -> None:
@@ -78,5 +78,8 @@ def test_its_examples_are_lines_for_a_shell(http: TestClient, read: Read) -> Non
 def test_words_of_the_interface_are_no_markup(http: TestClient, read: Read) -> None:
     said = "".join(text for _, text in read.texts)
     assert 'held values, such as {"kurt.f0": 0.04}' in said
+    assert "list (1 to 32) of string (1 to 2000 characters) or null" in said
+    assert "integer (1 to 100)" in said
+    assert "number (above 0, at most 90) or null" in said
     assert not re.search(r"&(lt|gt|amp|quot);", said)
     assert http.get("/docs", headers={"accept": "application/json"}).status_code == 406
