@@ -91,11 +91,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             ended=ended,
         )
         dispatcher.start()
+        aside, computing = ThreadPoolExecutor(1, "aside"), ThreadPoolExecutor(1, "computing")
+        app.state.service = State(chosen, store, datasets, dispatcher, aside, computing)
         try:
-            with ThreadPoolExecutor(1, "aside") as aside, ThreadPoolExecutor(1, "computing") as computing:
-                app.state.service = State(chosen, store, datasets, dispatcher, aside, computing)
-                yield
+            yield
         finally:
+            for pool in (aside, computing):  # who asked for what they do now is gone
+                pool.shutdown(wait=False, cancel_futures=True)
             dispatcher.stop()
             store.close()
 

@@ -1,7 +1,6 @@
 """POST /v1/datasets takes a measured file, GET /v1/datasets/{id} says what it holds, .../samples gives it."""
 
 import asyncio
-import functools
 import hashlib
 import json
 from typing import Annotated
@@ -52,9 +51,11 @@ async def upload(request: Request, response: Response, declared: Annotated[Decla
             async for piece in chunks(request, service.settings.upload_limit):
                 digest.update(piece)
                 file.write(piece)
-        add = functools.partial(service.datasets.add, folder, digest.hexdigest(), declared.model_dump())
+        arguments = folder, digest.hexdigest(), declared.model_dump(), service.settings.upload_limit
         try:
-            dataset, new = await asyncio.get_running_loop().run_in_executor(service.aside, add)
+            dataset, new = await asyncio.get_running_loop().run_in_executor(
+                service.aside, service.datasets.add, *arguments
+            )
         except BrdfError as error:
             error.field = error.field or "body"
             raise
