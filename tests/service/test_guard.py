@@ -95,13 +95,8 @@ def test_the_queue_of_a_key_is_its_own(settings: Settings, request_body: dict[st
 
 
 @pytest.fixture
-def idle(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
-    """A client of a locked service whose dispatcher never starts."""
-    monkeypatch.setattr("service.app.Dispatcher.start", lambda self: None)
-    monkeypatch.setattr("service.app.Dispatcher.stop", lambda self: None)
-    closed = dataclasses.replace(settings, api_keys=keys.hashes(f"{KEY},{OTHER}"), queue_limit=1)
-    with TestClient(create_app(closed), raise_server_exceptions=False) as client:
-        yield client
+def idle_settings(settings: Settings) -> Settings:
+    return dataclasses.replace(settings, api_keys=keys.hashes(f"{KEY},{OTHER}"), queue_limit=1)
 
 
 def test_open_to_other_machines_only_with_a_key(tmp_path: pathlib.Path) -> None:
