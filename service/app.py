@@ -93,16 +93,20 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             ended=ended,
         )
         dispatcher.start()
+        aside, computing = ThreadPoolExecutor(1, "aside"), ThreadPoolExecutor(1, "computing")
+        app.state.service = State(chosen, store, datasets, dispatcher, aside, computing)
         try:
-            with ThreadPoolExecutor(1, "aside") as aside, ThreadPoolExecutor(1, "computing") as computing:
-                app.state.service = State(chosen, store, datasets, dispatcher, aside, computing)
-                yield
+            yield
         finally:
+            for pool in (aside, computing):  # who asked for what they do now is gone
+                pool.shutdown(wait=False, cancel_futures=True)
             dispatcher.stop()
             store.close()
 
     summary = "Reflectance models fitted to measurements, with intervals, errors and lobe plots."
-    app = _App(title="brdfcore", version=bc.__version__, summary=summary, lifespan=running)
+    app = _App(
+        title="brdfcore", version=bc.__version__, summary=summary, lifespan=running, docs_url=None, redoc_url=None
+    )
     app.state.ending = lambda: False
     app.state.metrics, app.state.settings = metrics, chosen
     errors.install(app)

@@ -15,6 +15,7 @@ import re
 import shutil
 import tempfile
 import time
+import zipfile
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -51,13 +52,17 @@ class Datasets:
         finally:
             shutil.rmtree(folder, ignore_errors=True)  # after `add` has kept it there is nothing left to remove
 
-    def add(self, folder: Path, sha256: str, declared: dict[str, str | None]) -> tuple[DatasetView, bool]:
-        """The dataset in `folder`/data, and whether it is new; raises what `brdfcore.read` does."""
+    def add(self, folder: Path, sha256: str, declared: dict[str, str | None], most: int) -> tuple[DatasetView, bool]:
+        """The dataset in `folder`/data, of at most so many bytes unpacked, and whether it is new.
+
+        Raises what `brdfcore.read` does.
+        """
         name = hashlib.sha256(f"{sha256} {json.dumps(declared, sort_keys=True)}".encode()).hexdigest()
         known = self.get(name)
         if known:
             return known, False
         data = folder / "data"
+        _check_unpacked(data, most)
         samples = read(data, **declared)
         about = DatasetView(
             id=name,
@@ -157,6 +162,19 @@ def _samples(given: DirectionPairs, values: Tensor, field: str, **keywords: Any)
             name += "_deg"
         error.field = ".".join(part for part in (field, name) if part)
         raise
+
+
+def _check_unpacked(path: Path, most: int) -> None:
+    """Refuse a small archive of much: what is no archive has been measured when it came in."""
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > most:
+            raise BrdfError(
+                f"Expected an archive of at most {most} bytes unpacked, got {size}. Send less, or raise the server's "
+                "limit.",
+                field="body",
+            )
 
 
 def _to_disk(path: Path) -> None:

@@ -4,12 +4,14 @@ BrdfError (any)           422, `field` names the input at fault
 ProblemError              the status and the sentence of the route that raised it
 RequestValidationError    422, `errors` lists every field at fault
 404, 405 (with Allow)     from the router
+503, 507                  the store is locked for long; the disk is full: nothing of the request is kept
 anything else             500, details in the log only
 and before any route      401 without a known key, 431 for too large headers (guard.py)
 """
 
 import http
 import logging
+import sqlite3
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,9 +24,11 @@ from starlette.routing import Match
 
 from brdfcore.errors import BrdfError
 
+from . import disk
 from .schemas import FieldError, Problem
 
 PROBLEM_TYPE = "application/problem+json"
+WRITES = (503, 507)  # what whoever writes may meet
 _METHODS = ("DELETE", "GET", "PATCH", "POST", "PUT")
 _MOST_ERRORS = 20  # a body of 10,000 bad rows answers with the first ones
 
@@ -46,6 +50,8 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(BrdfError, _brdf_error)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(OSError, _disk_error)
+    app.add_exception_handler(sqlite3.OperationalError, _disk_error)
     app.add_exception_handler(Exception, _internal)
 
 
@@ -148,6 +154,17 @@ def _allowed(request: Request) -> list[str]:
         return any(route.matches(scope)[0] is Match.FULL for route in request.app.router.routes)
 
     return [method for method in _METHODS if answers(method)]
+
+
+async def _disk_error(request: Request, error: Exception) -> Response:
+    if disk.full(error):
+        _log.error("%s %s found the disk full", request.method, request.url.path)
+        return problem(
+            507, "The service has no room left on its disk, and kept nothing of this. Make room, send it again."
+        )
+    if isinstance(error, sqlite3.OperationalError) and error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
+        return problem(503, "The service is too busy to keep this now. Send it again.", headers={"retry-after": "1"})
+    raise error
 
 
 async def _internal(request: Request, error: Exception) -> Response:

@@ -77,7 +77,8 @@ def shown(document: dict[str, Any]) -> dict[str, Any]:
         for method, operation in operations.items():
             for parameter in operation.get("parameters", ()):
                 if parameter["name"] in PARAMETERS:
-                    parameter["example"] = PARAMETERS[parameter["name"]]
+                    example, known = PARAMETERS[parameter["name"]], parameter["schema"].get("enum", [])
+                    parameter["example"] = known[0] if known and example not in known else example
             for name, body in BODIES.get((method, path), {}).items():
                 for content in operation["requestBody"]["content"].values():
                     content.setdefault("examples", {})[name] = {"value": body}

@@ -4,10 +4,14 @@ Torch's first forward derivative imports 800 modules, which takes longer than a 
 them this early. No backward pass here: on a machine with a GPU it would start threads, and a fork loses threads.
 """
 
+import atexit
+import os
+
 import torch
 
 from . import work
 
 __all__ = ["work"]
 
+atexit.register(os._exit, 0)  # the fork server ends with its server at once; taking torch down takes a second
 torch.func.jacfwd(lambda x: (2 * x).sum())(torch.zeros(1))

@@ -22,7 +22,7 @@ from brdfcore.errors import BrdfError
 from brdfcore.fitting import Progress, fit
 from brdfcore.fitting.comparison import compare
 
-from .. import renders, tables
+from .. import disk, renders, tables
 from ..datasets import Datasets
 from ..schemas import AlbedoRequest, FitRequest, JobKind, RenderRequest
 from .retries import ASK_FOR_LESS
@@ -41,12 +41,18 @@ def run(out: Connection, data: str, kind: JobKind, body: bytes, memory: int) -> 
 
 
 def answer(say: Say, data: Path, kind: JobKind, body: bytes, memory: int) -> None:
-    """Say ("progress", JSON) any number of times, then ("succeeded", JSON) or ("failed", sentence, reason)."""
+    """Say ("progress", JSON) any number of times, then one of the others.
+
+    ("succeeded", JSON), ("failed", sentence, reason), or ("interrupted", what happened) by what is not the job's doing.
+    """
     try:
         say(("succeeded", _WORK[kind](say, data, body)))
     except BrdfError as error:
         say(("failed", str(error), "data"))
     except Exception as error:
+        if disk.full(error):
+            say(("interrupted", "found the disk full"))
+            return
         if isinstance(error, MemoryError) or "allocate memory" in str(error):  # torch raises RuntimeError for it
             sentence = f"Expected the job to need less than {memory} bytes, but it asked for more. {ASK_FOR_LESS}"
             reason = "memory"

@@ -4,6 +4,7 @@ from . import (
     albedo,
     batches,
     datasets,
+    docs,
     evaluate,
     events,
     export,
@@ -32,4 +33,5 @@ ROUTERS = (
     formats.router,
     health.router,
     page.router,
+    docs.router,
 )

@@ -12,7 +12,7 @@ import brdfcore as bc
 from brdfcore.energy._described import described
 
 from .. import tables
-from ..errors import ProblemError, inlined, responses
+from ..errors import WRITES, ProblemError, inlined, responses
 from ..jobs.records import Job
 from ..materials import material_of
 from ..schemas import AlbedoRequest, AlbedoView, TablePage, TableSummary, TableView
@@ -39,7 +39,7 @@ _FILE = {kind: {"schema": {"format": "binary"}} for kind in _NPZ} | {"applicatio
     responses={
         200: {"model": AlbedoView | TableView, "description": "the values, or a finished table"},
         202: {"model": TableView, "description": "a table, accepted"},
-        **responses(406, 408, 409, 413, 415, 422, 429),
+        **responses(406, 408, 409, 413, 415, 422, 429, *WRITES),
     },
     openapi_extra={"requestBody": _BODY},
 )
@@ -97,13 +97,13 @@ async def table(request: Request, table_id: str) -> Response:
     return Response(content, media_type=media_type, headers={"vary": "accept"})
 
 
-@router.post("/{table_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 409, 422))
+@router.post("/{table_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 409, 422, *WRITES))
 async def cancel(request: Request, table_id: str) -> TableView:
     """Cancel a table that is queued or running; its process ends at once."""
     return TableView(**_jobs.view(await _jobs.cancelled(state(request), "albedo_table", table_id)))
 
 
-@router.delete("/{table_id}", dependencies=_JSON, status_code=204, responses=responses(404, 406, 422))
+@router.delete("/{table_id}", dependencies=_JSON, status_code=204, responses=responses(404, 406, 422, *WRITES))
 async def remove(request: Request, table_id: str) -> None:
     """Remove a table for good, cancelling it first where it is not finished."""
     service = state(request)

@@ -12,7 +12,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from brdfcore.errors import BrdfError
 from brdfcore.fitting import check
 
-from ..errors import ProblemError, inlined, responses
+from ..errors import WRITES, ProblemError, inlined, responses
 from ..jobs.records import Asked, Batch, Job
 from ..schemas import FINISHED, BatchPage, BatchRequest, BatchRow, BatchTable, BatchView, FitRequest, RequestView
 from ..state import State, state
@@ -31,7 +31,7 @@ _TABLE = {"application/json": {"schema": inlined(BatchTable)}, "text/csv": {"sch
     "",
     status_code=202,
     dependencies=_JSON,
-    responses=responses(406, 408, 409, 413, 415, 422, 429),
+    responses=responses(406, 408, 409, 413, 415, 422, 429, *WRITES),
     openapi_extra={"requestBody": _BODY},
 )
 async def submit(request: Request, response: Response) -> BatchView:
@@ -73,7 +73,7 @@ async def table(request: Request, batch_id: str) -> Response:
     return Response(BatchTable(rows=rows).model_dump_json(), media_type=media_type, headers={"vary": "accept"})
 
 
-@router.post("/{batch_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 422))
+@router.post("/{batch_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 422, *WRITES))
 async def cancel(request: Request, batch_id: str) -> BatchView:
     """Cancel those fits of a batch that are queued or running."""
     service = state(request)
@@ -83,7 +83,7 @@ async def cancel(request: Request, batch_id: str) -> BatchView:
     return _view(service, batch)
 
 
-@router.delete("/{batch_id}", status_code=204, dependencies=_JSON, responses=responses(404, 406, 422))
+@router.delete("/{batch_id}", status_code=204, dependencies=_JSON, responses=responses(404, 406, 422, *WRITES))
 async def remove(request: Request, batch_id: str) -> None:
     """Remove a batch and its fits for good."""
     service = state(request)

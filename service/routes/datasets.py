@@ -1,7 +1,6 @@
 """POST /v1/datasets takes a measured file, GET /v1/datasets/{id} says what it holds, .../samples gives it."""
 
 import asyncio
-import functools
 import hashlib
 import json
 from typing import Annotated
@@ -13,7 +12,7 @@ from brdfcore.energy._described import finite
 from brdfcore.errors import BrdfError
 from brdfcore.formats.samples import angles
 
-from ..errors import ProblemError, responses
+from ..errors import WRITES, ProblemError, responses
 from ..schemas import DatasetSamples, DatasetView
 from ..state import State, state
 from ._http import chunks, json_accepted
@@ -38,7 +37,7 @@ class Declarations(BaseModel):
 @router.post(
     "",
     status_code=201,
-    responses={200: {"model": DatasetView, "description": "known"}, **responses(406, 408, 413, 415, 422)},
+    responses={200: {"model": DatasetView, "description": "known"}, **responses(406, 408, 413, 415, 422, *WRITES)},
     openapi_extra={"requestBody": _ANY_BYTES},
 )
 async def upload(request: Request, response: Response, declared: Annotated[Declarations, Query()]) -> DatasetView:
@@ -52,9 +51,11 @@ async def upload(request: Request, response: Response, declared: Annotated[Decla
             async for piece in chunks(request, service.settings.upload_limit):
                 digest.update(piece)
                 file.write(piece)
-        add = functools.partial(service.datasets.add, folder, digest.hexdigest(), declared.model_dump())
+        arguments = folder, digest.hexdigest(), declared.model_dump(), service.settings.upload_limit
         try:
-            dataset, new = await asyncio.get_running_loop().run_in_executor(service.aside, add)
+            dataset, new = await asyncio.get_running_loop().run_in_executor(
+                service.aside, service.datasets.add, *arguments
+            )
         except BrdfError as error:
             error.field = error.field or "body"
             raise

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from brdfcore.fitting import check
 
 from ..datasets import inline_samples, missing
-from ..errors import ProblemError, inlined, responses
+from ..errors import WRITES, ProblemError, inlined, responses
 from ..jobs.records import Job
 from ..schemas import FitPage, FitRequest, FitSummary, FitView, RequestView, SamplesView
 from ..state import state
@@ -24,7 +24,10 @@ _BODY = {"required": True, "content": {"application/json": {"schema": inlined(Fi
 @router.post(
     "",
     status_code=202,
-    responses={200: {"model": FitView, "description": "finished"}, **responses(406, 408, 409, 413, 415, 422, 429)},
+    responses={
+        200: {"model": FitView, "description": "finished"},
+        **responses(406, 408, 409, 413, 415, 422, 429, *WRITES),
+    },
     openapi_extra={"requestBody": _BODY},
 )
 async def submit(request: Request, response: Response) -> FitView:
@@ -47,13 +50,13 @@ async def read(request: Request, fit_id: str) -> FitView:
     return FitView(**_jobs.view(_jobs.found(state(request), "fit", fit_id)))
 
 
-@router.post("/{fit_id}/cancel", responses=responses(404, 406, 409, 422))
+@router.post("/{fit_id}/cancel", responses=responses(404, 406, 409, 422, *WRITES))
 async def cancel(request: Request, fit_id: str) -> FitView:
     """Cancel a fit that is queued or running; its process ends at once."""
     return FitView(**_jobs.view(await _jobs.cancelled(state(request), "fit", fit_id)))
 
 
-@router.delete("/{fit_id}", status_code=204, responses=responses(404, 406, 422))
+@router.delete("/{fit_id}", status_code=204, responses=responses(404, 406, 422, *WRITES))
 async def remove(request: Request, fit_id: str) -> None:
     """Remove a fit and its inline samples for good, cancelling it first where it is not finished."""
     await _jobs.removed(state(request), "fit", fit_id)

@@ -16,7 +16,6 @@ function asked() {
   const form = at("key");
   complain("key-error", hasKey() ? "Expected a key that this service knows. Check it, and try again." : null);
   form.hidden = false;
-  at("docs").hidden = true; // a link sends no key
   at("key-text").focus();
   return new Promise((done) => {
     form.addEventListener(

@@ -24,5 +24,20 @@ def http(settings: Settings) -> Iterator[TestClient]:
 
 
 @pytest.fixture
+def idle_settings(settings: Settings) -> Settings:
+    """What `idle` is set to; test files that need something else have a fixture of this name."""
+    return settings
+
+
+@pytest.fixture
+def idle(idle_settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
+    """A client of an app whose dispatcher never starts, so that jobs stay queued."""
+    monkeypatch.setattr("service.app.Dispatcher.start", lambda self: None)
+    monkeypatch.setattr("service.app.Dispatcher.stop", lambda self: None)
+    with TestClient(create_app(idle_settings), raise_server_exceptions=False) as client:
+        yield client
+
+
+@pytest.fixture
 def request_body() -> dict[str, Any]:
     return {"samples": measured_diffuser(), "model": "lambert"}

@@ -24,31 +24,30 @@ def test_a_hundred_kills_lose_nothing(tmp_path: pathlib.Path) -> None:
         db.executescript(COUNTING)
     while kills:
         with server(data, workers=2) as (process, client):
+            for _ in range(min(5, JOBS - len(accepted))):
+                accepted.append(client.fit(measured_diffuser(200), wait=False, seed=len(accepted), **SLOW).id)
             while kills:
-                while len(accepted) < JOBS and len(client.recent(status="queued")) < 4:
-                    fit = client.fit(measured_diffuser(200), wait=False, seed=len(accepted), **SLOW)
-                    accepted.append(fit.id)
-                time.sleep(rng.uniform(0.0, 0.5))
                 kill = kills.pop()
                 if kill == "server":
+                    time.sleep(rng.uniform(0.0, 0.5))
                     process.kill()
                     process.wait()
                     break
+                until(lambda: client.recent(status="running"), seconds=120)
+                time.sleep(rng.uniform(0.0, 0.5))
                 workers = [pid for pid in session_ids(process.pid) if pid != process.pid]
-                until(lambda: client.recent(status="running"))
-                for pid in rng.sample(workers, min(1, len(workers))):
+                # mostly the newest, an attempt; else any, the fork server among them, which takes seconds to come back
+                for pid in [max(workers) if rng.random() < 0.8 else rng.choice(workers)] if workers else ():
                     with contextlib.suppress(ProcessLookupError):  # it ended by itself just now
                         os.kill(pid, signal.SIGKILL)
     with server(data, workers=2) as (_, client):
         while len(accepted) < JOBS:
             accepted.append(client.fit(measured_diffuser(200), wait=False, seed=len(accepted), **SLOW).id)
-        until(lambda: not client.recent(status="queued") and not client.recent(status="running"), seconds=300)
+        until(lambda: not client.recent(status="queued") and not client.recent(status="running"), seconds=600)
         ends = {fit_id: client.get(fit_id).view for fit_id in accepted}
-    crashed = [view for view in ends.values() if view.status == "failed"]
-    assert all("in each of 3 attempts" in (view.error or "") for view in crashed)
-    assert len(crashed) <= JOBS // 10
+    assert [view.error for view in ends.values() if view.error] == []
     succeeded = [fit_id for fit_id, view in ends.items() if view.status == "succeeded"]
-    assert len(succeeded) + len(crashed) == JOBS
+    assert len(succeeded) == JOBS
     with sqlite3.connect(data / "jobs.sqlite3") as db:
         assert db.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
         assert sorted(row[0] for row in db.execute("SELECT job FROM commits")) == sorted(succeeded)

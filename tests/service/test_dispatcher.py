@@ -6,6 +6,7 @@ import logging
 import os
 import pathlib
 import sys
+import threading
 import time
 import types
 from collections.abc import Callable, Iterator
@@ -269,6 +270,25 @@ def test_a_result_outlives_a_store_that_cannot_write(
         done = ended(store, store.submit("{}", b""))
     assert refused
     assert (done.status, done.attempts) == ("succeeded", 1)
+
+
+def test_a_stopped_worker_that_wakes_after_its_lease_is_refused(tmp_path: pathlib.Path) -> None:
+    store = JobStore(tmp_path / "jobs.sqlite3", lease=0.5)
+    woken = threading.Event()
+
+    class Stopped(Scripted):
+        def poll(self, seconds: float) -> list[Event]:
+            woken.wait(10)
+            return super().poll(seconds)
+
+    (tmp_path / "other").mkdir()  # a lock of its own: a dispatcher of another machine, say
+    with dispatching(store, tmp_path, Stopped(["succeeded"])), dispatching(store, tmp_path / "other", Scripted([])):
+        job = store.submit("{}", b"")
+        until(lambda: store.running().get(job.id) == 2)
+        woken.set()
+        time.sleep(0.3)
+        assert current(store, job).status == "running"
+    store.close()
 
 
 def test_attempts_are_told_to_use_one_thread(store: JobStore, tmp_path: pathlib.Path) -> None:

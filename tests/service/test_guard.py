@@ -44,8 +44,8 @@ def test_no_route_but_health_answers_without_a_key(locked: TestClient) -> None:
                 assert answer.status_code == 401, (method, path)
                 assert answer.headers["www-authenticate"] == "Bearer"
                 assert answer.json()["detail"].startswith("Expected a known API key.")
-    assert OPEN == ("/", "/healthz", "/readyz")
-    assert locked.get("/docs").status_code == 401
+    assert OPEN == ("/", "/docs", "/healthz", "/readyz")
+    assert locked.get("/openapi.json").status_code == 401
     assert locked.get("/nowhere").status_code == 401
 
 
@@ -95,13 +95,8 @@ def test_the_queue_of_a_key_is_its_own(settings: Settings, request_body: dict[st
 
 
 @pytest.fixture
-def idle(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
-    """A client of a locked service whose dispatcher never starts."""
-    monkeypatch.setattr("service.app.Dispatcher.start", lambda self: None)
-    monkeypatch.setattr("service.app.Dispatcher.stop", lambda self: None)
-    closed = dataclasses.replace(settings, api_keys=keys.hashes(f"{KEY},{OTHER}"), queue_limit=1)
-    with TestClient(create_app(closed), raise_server_exceptions=False) as client:
-        yield client
+def idle_settings(settings: Settings) -> Settings:
+    return dataclasses.replace(settings, api_keys=keys.hashes(f"{KEY},{OTHER}"), queue_limit=1)
 
 
 def test_open_to_other_machines_only_with_a_key(tmp_path: pathlib.Path) -> None:
@@ -115,7 +110,7 @@ def test_every_answer_carries_its_id_and_the_security_headers(
     http: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("service.jobs.store.JobStore.newest", lambda *a, **k: 1 / 0)
-    for path, status in (("/healthz", 200), ("/nowhere", 404), ("/v1/fits", 500), ("/docs", 200)):
+    for path, status in (("/healthz", 200), ("/nowhere", 404), ("/v1/fits", 500)):
         answer = http.get(path, headers={"x-request-id": "from-a-proxy.1"})
         assert answer.status_code == status
         assert answer.headers["x-request-id"] == "from-a-proxy.1"

@@ -4,14 +4,12 @@ import csv
 import dataclasses
 import io
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from service_cases import KD, csv_file
 from starlette.testclient import TestClient
 
-from service.app import create_app
 from service.client import Client, WaitError
 from service.settings import Settings
 
@@ -81,13 +79,8 @@ def test_all_is_checked_before_any_is_accepted(
 
 
 @pytest.fixture
-def idle(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
-    """A client of an app whose dispatcher never starts and whose queue holds three jobs."""
-    monkeypatch.setattr("service.app.Dispatcher.start", lambda self: None)
-    monkeypatch.setattr("service.app.Dispatcher.stop", lambda self: None)
-    small = dataclasses.replace(settings, queue_limit=3)
-    with TestClient(create_app(small), raise_server_exceptions=False) as client:
-        yield client
+def idle_settings(settings: Settings) -> Settings:
+    return dataclasses.replace(settings, queue_limit=3)
 
 
 def test_a_batch_is_accepted_whole_or_not_at_all(idle: TestClient) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import hashlib
+import io
 import math
 import os
 import pathlib
@@ -62,13 +63,24 @@ def test_the_same_file_at_the_same_time_is_one_dataset(tmp_path: pathlib.Path) -
     def add(_: int) -> tuple[str, bool]:
         with datasets.incoming() as folder:
             (folder / "data").write_bytes(csv_file())
-            dataset, new = datasets.add(folder, "0" * 64, declared)
+            dataset, new = datasets.add(folder, "0" * 64, declared, 2**20)
             return dataset.id, new
 
     with ThreadPoolExecutor(4) as pool:
         added = list(pool.map(add, range(8)))
     assert len({name for name, _ in added}) == 1
     assert sum(new for _, new in added) == 1
+
+
+def test_an_archive_of_much_is_refused_before_it_is_unpacked(http: TestClient, settings: Settings) -> None:
+    out = io.BytesIO()
+    np.savez_compressed(out, values=np.zeros(settings.upload_limit // 8))
+    assert len(out.getvalue()) < settings.upload_limit // 100
+    answer = http.post("/v1/datasets", content=out.getvalue())
+    assert answer.status_code == 422
+    size = settings.upload_limit + 128
+    assert answer.json()["detail"].startswith(f"Expected an archive of at most 1048576 bytes unpacked, got {size}.")
+    assert answer.json()["field"] == "body"
 
 
 def test_what_was_masked_is_reported(http: TestClient) -> None:

@@ -6,8 +6,6 @@ import pytest
 from starlette.testclient import TestClient
 
 import brdfcore as bc
-from service.app import create_app
-from service.settings import Settings
 
 
 @pytest.fixture
@@ -49,13 +47,8 @@ def test_refusals(http: TestClient, fit: dict[str, Any], request_body: dict[str,
 FIXED = {"ward_bounded.ax": 0.1, "ward_bounded.ay": 0.5}
 
 
-def test_what_has_not_succeeded_has_no_export(
-    settings: Settings, request_body: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("service.app.Dispatcher.start", lambda self: None)
-    monkeypatch.setattr("service.app.Dispatcher.stop", lambda self: None)
-    with TestClient(create_app(settings), raise_server_exceptions=False) as idle:
-        queued = idle.post("/v1/fits", json=request_body).json()
-        answer = idle.get(f"/v1/fits/{queued['id']}/export/json")
+def test_what_has_not_succeeded_has_no_export(idle: TestClient, request_body: dict[str, Any]) -> None:
+    queued = idle.post("/v1/fits", json=request_body).json()
+    answer = idle.get(f"/v1/fits/{queued['id']}/export/json")
     assert answer.status_code == 409
     assert "it is queued. An export needs a fit that has succeeded" in answer.json()["detail"]

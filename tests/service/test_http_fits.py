@@ -11,9 +11,7 @@ from starlette.testclient import TestClient
 
 import brdfcore as bc
 from brdfcore.fitting.result import STATUSES
-from service.app import create_app
 from service.schemas import FitOutcome
-from service.settings import Settings
 
 Body = dict[str, Any]
 
@@ -34,15 +32,6 @@ def fit(http: TestClient, request_body: Body) -> dict[str, Any]:
     assert answer.status_code == 200, answer.text
     assert answer.json()["status"] == "succeeded", answer.text
     return dict(answer.json())
-
-
-@pytest.fixture
-def idle(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A client of an app whose dispatcher never starts, so that fits stay queued."""
-    monkeypatch.setattr("service.app.Dispatcher.start", lambda self: None)
-    monkeypatch.setattr("service.app.Dispatcher.stop", lambda self: None)
-    with TestClient(create_app(settings), raise_server_exceptions=False) as client:
-        yield client
 
 
 def test_a_fit_is_accepted_and_ends(http: TestClient, request_body: Body) -> None:

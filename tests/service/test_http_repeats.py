@@ -1,28 +1,16 @@
 """The same work is done once: idempotency keys, reuse of earlier results; progress as events; lists by status."""
 
 import json
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
-from service.app import create_app
 from service.jobs.store import JobStore
-from service.settings import Settings
 
 Body = dict[str, Any]
 WAIT = {"prefer": "wait=20"}
-
-
-@pytest.fixture
-def idle(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
-    """A client of an app whose dispatcher never starts, so that fits stay queued."""
-    monkeypatch.setattr("service.app.Dispatcher.start", lambda self: None)
-    monkeypatch.setattr("service.app.Dispatcher.stop", lambda self: None)
-    with TestClient(create_app(settings), raise_server_exceptions=False) as client:
-        yield client
 
 
 def test_a_hundred_posts_with_one_key_make_one_fit(idle: TestClient, request_body: Body) -> None:

@@ -41,6 +41,7 @@ def test_every_file_is_served_with_its_type_under_the_strict_policy(http: TestCl
 
 def test_the_policy_of_the_page_is_for_the_page_only(http: TestClient) -> None:
     assert http.get("/", headers=BROWSER).headers["content-security-policy"] == POLICY
+    assert http.get("/docs").headers["content-security-policy"] == POLICY
     assert http.get("/v1/models").headers["content-security-policy"].startswith("default-src 'none'")
 
 
