@@ -8,12 +8,13 @@ Spheres, planes and rectangles with the library's own materials, and lights with
 meshes, and the frame rates of a graphics card.
 """
 
+from .camera import Camera
 from .effects import Effect, Plan
 from .image import Image
 from .lights import Directional, Dome, Point, RectangleLight, SphereLight
 from .plan import everything, plan
 from .progressive import render
-from .scene import LIGHTS, SCENES, SHAPES, Camera, Scene
+from .scene import LIGHTS, SCENES, SHAPES, Scene
 from .shapes import Plane, Rectangle, Sphere
 
 __all__ = [

@@ -15,22 +15,24 @@ from torch import Tensor
 
 from ..errors import InvalidValueError
 from ..models.material import Material, check_material, material
+from ..tabulated import Tabulated
 from . import _checks
 from ._checks import Vector
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Shape(ABC):
-    """What shapes share: a material, as an object or a text, the tangent of its x axis, and a name for the plan."""
+    """What shapes share: a material or a text of one, the tangent of its x axis, and a name for the plan."""
 
-    material: Material
+    material: Material | Tabulated
     tangent: Vector | None = None
     name: str = ""
 
     def __post_init__(self) -> None:
         if isinstance(self.material, str):
             object.__setattr__(self, "material", material(self.material))
-        check_material(self.material)
+        if not isinstance(self.material, Tabulated):
+            check_material(self.material)
         if self.tangent is not None:
             object.__setattr__(self, "tangent", _checks.direction("tangent", self.tangent))
         if not isinstance(self.name, str):
