@@ -3,14 +3,11 @@
 import dataclasses
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from ._bar import with_bar
-
-if TYPE_CHECKING:
-    pass
 
 
 def command(
@@ -19,7 +16,9 @@ def command(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="A .png or linear .npy; by default SCENE.png.", show_default=False),
+        typer.Option(
+            "--output", "-o", help="A .png, or linear .exr or .npy; by default SCENE.png.", show_default=False
+        ),
     ] = None,
     tolerance: Annotated[float, typer.Option(help="Radiance that the plan may leave out.")] = 1e-3,
     samples: Annotated[int | None, typer.Option(help="Samples a pixel; by default the scene's.")] = None,
@@ -35,13 +34,13 @@ def command(
     """Render a scene; print which effects were simulated, and why. Without a SCENE, list the shipped ones."""
     from ..errors import InvalidValueError
     from ..render import SCENES, Scene, plan, render
-    from ..render.image import check_suffix
+    from ..render.image import check_path
 
     if scene is None:
         typer.echo("\n".join(SCENES))
         return
     path = output or Path(f"{Path(scene).stem}.png")
-    check_suffix(path)  # what cannot be written is refused before the work, not after it
+    check_path(path)  # what cannot be written is refused before the work, not after it
     if device not in ("cpu", "cuda"):
         raise InvalidValueError(f"Expected --device to be cpu or cuda, got {device!r}. Choose one.", field="device")
     made = Scene.load(scene)

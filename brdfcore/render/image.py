@@ -10,9 +10,10 @@ import torch
 from torch import Tensor
 
 from ..errors import InvalidValueError
+from ._exr import exr
 from .effects import Plan
 
-SUFFIXES = (".png", ".npy")
+SUFFIXES = (".png", ".npy", ".exr")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,22 +32,28 @@ class Image:
         return (self.pixels * self.pixels.new_tensor([0.2126, 0.7152, 0.0722])).sum(-1)
 
     def save(self, path: str | Path) -> Path:
-        """The path of the file that was written: .npy holds linear float32, .png the exposed and encoded image."""
+        """The path of the file that was written: .npy and .exr hold linear float32, .png the exposed, encoded image."""
         path = Path(path)
-        check_suffix(path)
+        check_path(path)
         pixels = self.pixels.detach().cpu()
         if path.suffix == ".npy":
             np.save(path, pixels.float().numpy())
+        elif path.suffix == ".exr":
+            path.write_bytes(exr(pixels.float().numpy()))
         else:
             path.write_bytes(png(encoded(pixels, self.plan.scene.exposure)))
         return path
 
 
-def check_suffix(path: Path) -> None:
-    """Raise where a path does not end in a known suffix."""
+def check_path(path: Path) -> None:
+    """Raise where a path does not end in a known suffix, or lies in a folder that does not exist."""
     if path.suffix not in SUFFIXES:
         raise InvalidValueError(
-            f"Expected the image's file to end in {' or '.join(SUFFIXES)}, got {path.name!r}. Rename it.", field="path"
+            f"Expected the image's file to end in {', '.join(SUFFIXES)}, got {path.name!r}. Rename it.", field="path"
+        )
+    if not path.parent.is_dir():
+        raise InvalidValueError(
+            f"Expected the image's folder to exist, got {str(path.parent)!r}. Make it first.", field="path"
         )
 
 

@@ -65,8 +65,9 @@ def test_it_plans_only_and_lists_scenes(run: Run) -> None:
 def test_mistakes_are_one_sentence(run: Run) -> None:
     code, out, error = run("ball.json", "-o", "ball.jpg")
     assert (code, out) == (2, "")
-    assert error == "brdf: Expected the image's file to end in .png or .npy, got 'ball.jpg'. Rename it.\n"
+    assert error == "brdf: Expected the image's file to end in .png, .npy, .exr, got 'ball.jpg'. Rename it.\n"
     assert run("ball.json", "--device", "tpu")[2].startswith("brdf: Expected --device to be cpu or cuda, got 'tpu'.")
-    assert run("bull.json")[0] == 2
+    assert run("ball.json", "-o", "none/ball.png")[2].startswith("brdf: Expected the image's folder to exist, got 'none'")
+    assert run("bull.json")[2].startswith("brdf: Expected scene to be a readable file, got 'bull.json' (No such file")
     assert "Did you mean 'walter_figure_3'?" in run("walter_figure_4")[2]
     assert run("ball.json", "--off", "rain")[2].startswith("brdf: Expected an effect to be a known name, got 'rain'.")
