@@ -3,6 +3,7 @@
 from ._figure import kind_of, save, to_bytes
 from .albedo import albedo
 from .comparison import comparison
+from .contours import contours
 from .directions import directions
 from .lobes import check_scale, lobes
 from .residuals import residuals, residuals_of
@@ -11,6 +12,7 @@ __all__ = [
     "albedo",
     "check_scale",
     "comparison",
+    "contours",
     "directions",
     "kind_of",
     "lobes",
