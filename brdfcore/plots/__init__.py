@@ -4,6 +4,7 @@ from ._figure import kind_of, save, to_bytes
 from .albedo import albedo
 from .comparison import comparison
 from .contours import contours
+from .differences import differences
 from .directions import directions
 from .lobes import check_scale, lobes
 from .residuals import residuals, residuals_of
@@ -13,6 +14,7 @@ __all__ = [
     "check_scale",
     "comparison",
     "contours",
+    "differences",
     "directions",
     "kind_of",
     "lobes",

@@ -10,7 +10,7 @@ meshes, and the frame rates of a graphics card.
 
 from .camera import Camera
 from .effects import Effect, Plan
-from .image import Image
+from .image import Image, psnr
 from .lights import Directional, Dome, Point, RectangleLight, SphereLight
 from .plan import everything, plan
 from .progressive import render
@@ -36,5 +36,6 @@ __all__ = [
     "SphereLight",
     "everything",
     "plan",
+    "psnr",
     "render",
 ]

@@ -57,11 +57,25 @@ def check_path(path: Path) -> None:
         )
 
 
-def encoded(pixels: Tensor, exposure: float) -> Tensor:
-    """The bytes (H, W, 3) of linear pixels, by sRGB's curve (IEC 61966-2-1); what exceeds white is white."""
+def srgb(pixels: Tensor, exposure: float) -> Tensor:
+    """Linear pixels, exposed, on sRGB's curve (IEC 61966-2-1), in [0, 1]; what exceeds white is white."""
     x = (pixels * exposure).clamp(0, 1)
-    curve = torch.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clamp(min=0.0031308) ** (1 / 2.4) - 0.055)
-    return (255 * curve).round().to(torch.uint8)
+    return torch.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clamp(min=0.0031308) ** (1 / 2.4) - 0.055)
+
+
+def encoded(pixels: Tensor, exposure: float) -> Tensor:
+    """The bytes (H, W, 3) of linear pixels on that curve."""
+    return (255 * srgb(pixels, exposure)).round().to(torch.uint8)
+
+
+def psnr(image: Image, reference: Image) -> float:
+    """The peak signal-to-noise ratio [dB] of an image as it is seen: exposed, on sRGB's curve, not rounded.
+
+    The mean of 20 log10(1 / root mean square error) over the channels, at most 200. Both are exposed as the reference.
+    """
+    exposure = reference.plan.scene.exposure
+    off = srgb(image.pixels.detach(), exposure) - srgb(reference.pixels.detach(), exposure)
+    return float((-10 * torch.log10(off.square().mean((0, 1)).clamp(min=1e-20))).mean())
 
 
 def png(rows: Tensor) -> bytes:
