@@ -7,6 +7,7 @@ a few neighbours, at most 7 x 7 pixels. What is as bright all over has no line.
 
 import itertools
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH, _TALLEST, _TITLE = 6.4, 4.5, 0.28  # of an image and of its title, inches
+_LETTERS = 12.5  # of the title in an inch
 _LEVELS = 12
 _WIDEST = 7  # pixels that are averaged along an edge
 
@@ -50,11 +52,13 @@ def contours(
     step = min((b - a for a, b in itertools.pairwise(drawn)), default=drawn[0])
     luminances = {name: _smoothed(image, step) for name, image in shown.items()}
     sizes = {name: _size(luminance.shape) for name, luminance in luminances.items()}
-    height = sum(size[1] + _TITLE for size in sizes.values()) + (0.45 if title else 0.1)
-    figure = new_figure(max(size[0] for size in sizes.values()) + 0.2, height)
+    width = max(size[0] for size in sizes.values()) + 0.2
+    wrapped = textwrap.wrap(title or "", int(_LETTERS * width))
+    height = sum(size[1] + _TITLE for size in sizes.values()) + 0.2 * len(wrapped) + 0.2
+    figure = new_figure(width, height)
     figure.set_layout_engine("constrained", h_pad=0.03, w_pad=0.03)
-    if title:
-        figure.suptitle(title, fontsize=10)
+    if wrapped:
+        figure.suptitle("\n".join(wrapped), fontsize=10)
     axes = figure.subplots(len(shown), 1, squeeze=False, height_ratios=[size[1] for size in sizes.values()])
     hues = colormaps["turbo"](np.linspace(0.15, 0.95, len(drawn)))
     for place, (name, image) in zip(axes.flat, shown.items(), strict=True):

@@ -33,6 +33,6 @@ def grazing(quick: bool, seed: int) -> tuple[list[tuple[Cell, ...]], list[Pictur
         for way, force in ways.items():
             shown[way], seconds = timed(scene, plan(scene, 0.0, force), seed)
             rows.append(row(figure, way, shown[way], seconds, reference))
-        title = f"{figure}: luminance at a grazing angle, {scene.objects[0].material}"
+        title = f"{figure}: luminance of {scene.objects[0].material} at a grazing angle"
         pictures.append(Picture(f"render-{name.split('_')[-1]}-luminance", title, contours(shown, title=title)))
     return rows, pictures

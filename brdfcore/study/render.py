@@ -45,7 +45,7 @@ def render(
     models: tuple[str, ...] | None = None,
 ) -> Study:
     """The study of images of size x size pixels, with each of `counts` samples."""
-    size = size or (12 if quick else 32)
+    size = size or (12 if quick else 24)
     counts = counts or ((16, 64, 256) if quick else (16, 64, 256, 1024, 4096))
     rows: list[tuple[Cell, ...]] = []
     panels, wins = [], []
