@@ -90,6 +90,19 @@ def test_shipped_scenes_render(name):
     assert 0.01 < float(image.pixels.mean()) < 2
 
 
+@pytest.mark.parametrize("name", SCENES)
+def test_shipped_lights_face_what_is_seen(name):
+    """No rectangle shines away from the scene."""
+    shipped = Scene.load(name)
+    small = dataclasses.replace(shipped, camera=dataclasses.replace(shipped.camera, width=16, height=10, grid=1))
+    _, vertices = visible(small)
+    for light in shipped.lights:
+        if isinstance(light, RectangleLight):
+            towards = vertices.point - torch.tensor(light.center, dtype=torch.float64)
+            facing = torch.linalg.cross(*(torch.tensor(e, dtype=torch.float64) for e in (light.edge_u, light.edge_v)))
+            assert float(((towards * facing).sum(-1) > 0).double().mean()) > 0.3
+
+
 def test_the_darkest_furnace():
     """Ashikhmin and Shirley's Fig. 2: about 68 % at the centre; by quadrature 69.57 %."""
     shipped = Scene.load("ashikhmin_shirley_figure_2_darkest")
@@ -114,5 +127,7 @@ def test_linoleum_highlights():
         small = dataclasses.replace(shipped.camera, width=64, height=64, grid=1)
         image = render(dataclasses.replace(shipped, camera=small, samples=32))
         rows, _ = visible(dataclasses.replace(shipped, camera=small))
-        wide.append(int((image.pixels.reshape(-1, 3)[rows, 0] > 0.25).sum()))
+        pixels = image.pixels.reshape(-1, 3)[rows]
+        assert float(pixels[:, 0].mean()) > 2 * float(pixels[:, 1].mean())  # it is red
+        wide.append(int((pixels[:, 1] > 0.25).sum()))
     assert wide[1] > 1.3 * wide[0] > 0
