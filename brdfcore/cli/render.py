@@ -37,8 +37,8 @@ def command(
 ) -> None:
     """Render a scene; print which effects were simulated, and why. Without a SCENE, list the shipped ones."""
     from .. import plots
-    from ..errors import InvalidValueError
     from ..render import SCENES, Scene, plan, render
+    from ..render._checks import device as check_device
     from ..render.image import check_path
 
     if scene is None:
@@ -48,8 +48,7 @@ def command(
     if contours is not None:
         plots.kind_of(contours)
     check_path(path)  # what cannot be written is refused before the work, not after it
-    if device not in ("cpu", "cuda"):
-        raise InvalidValueError(f"Expected --device to be cpu or cuda, got {device!r}. Choose one.", field="device")
+    check_device(device)
     made = Scene.load(scene)
     changed = {name: value for name, value in (("samples", samples), ("noise", noise)) if value is not None}
     made = dataclasses.replace(made, **changed) if changed else made  # type: ignore[arg-type]

@@ -54,6 +54,21 @@ def whole(name: str, value: object, lowest: int, highest: int) -> int:
     )
 
 
+def device(value: torch.device | str) -> torch.device:
+    """The processor or a graphics card that is there, or an error."""
+    try:
+        found = torch.device(value)
+    except RuntimeError:
+        found = None
+    cards = torch.cuda.device_count() if found is not None and found.type == "cuda" else 0
+    if found is None or not (found.type == "cpu" or (found.index or 0) < cards):
+        raise InvalidValueError(
+            f"Expected device to be cpu, or cuda where torch finds such a card, got {str(value)!r}. Choose another.",
+            field="device",
+        )
+    return found
+
+
 def colour(name: str, value: object) -> Colour:
     """A number that is not negative, or three, or a tensor of either, which may be differentiated."""
     if isinstance(value, Tensor):

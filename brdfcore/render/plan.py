@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from ..errors import InvalidValueError, unknown_name
 from ..tabulated import Tabulated
-from . import contributions
+from . import _checks, contributions
 from .effects import (
     BRDF_SAMPLING,
     CLOSED_FORM,
@@ -40,7 +40,7 @@ def plan(
     """The plan of a scene, whose image differs from that of everything by at most the tolerance [radiance].
 
     force    effect's name -> on or off, whatever the bounds say; "interreflection 2" off ends paths after one bounce
-    bounces  the most interreflections that are thought of
+    bounces  the most interreflections that are thought of, up to 1024
     Raises InvalidValueError for a tolerance below 0 and where nothing is left to sample a light with, and
     UnknownNameError for an effect that the scene does not have.
     """
@@ -48,6 +48,7 @@ def plan(
         raise InvalidValueError(
             f"Expected tolerance to be a finite number from 0, got {tolerance:g}. It is a radiance.", field="tolerance"
         )
+    _checks.whole("bounces", bounces, 0, 1024)
     forced = dict(force or {})
     lone = len(scene.objects) == 1
     materials = list({id(shape.material): shape.material for shape in scene.objects}.values())

@@ -235,6 +235,12 @@ def test_a_plan_of_another_scene():
         render(one, plan(other))
 
 
+@pytest.mark.parametrize("device", ["tpu", "cuda:99", "meta"])
+def test_a_device_that_is_not_there(device):
+    with pytest.raises(InvalidValueError, match=rf"^Expected device to be cpu, or cuda where .* got '{device}'"):
+        render(lone_sphere("lambert", [Dome(radiance=1.0)]), device=device)
+
+
 def test_everything_leaves_nothing_out():
     chosen = everything(lone_sphere("lambert + kurt", [Dome(radiance=1.0)]), 2)
     assert [effect.name for effect in chosen.effects if not effect.on] == ["albedo look-up", "interreflection 3"]
