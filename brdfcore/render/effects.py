@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+from .measured import AnySurface
 from .scene import Scene
-from .surfaces import Surface
 
 CLOSED_FORM = "closed form"
 LOOK_UP = "albedo look-up"
@@ -35,7 +35,7 @@ class Plan:
     scene: Scene
     tolerance: float  # [radiance]
     effects: tuple[Effect, ...]
-    surfaces: tuple[Surface, ...]  # one a material
+    surfaces: tuple[AnySurface, ...]  # one a material
     surface_of: tuple[int, ...]  # of each object
     depth: int  # interreflections
     albedo_tolerance: float

@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 
 from ..models.material import Material
+from .camera import Camera
 from .lights import Directional
-from .scene import Camera
 from .shapes import Sphere
 from .trace import Vertices, arrive
 
