@@ -18,6 +18,7 @@ from brdfcore.energy.plan import SINGLE
 from brdfcore.energy.refinement import Rows
 from brdfcore.energy.rules import LADDER, gauss, ring
 from brdfcore.energy.slope_disc import SlopeDisc
+from brdfcore.errors import InvalidValueError
 
 # --- rules in one dimension ------------------------------------------------------------------------------------------
 
@@ -108,6 +109,7 @@ CLOSED = [
     "oren_nayar(energy_preserving, kd=0.4, sigma=1.2)",
     "ward_bounded(rs=1, a=0.3)",
     "ward_bounded(rs=1, ax=0.1, ay=0.7)",
+    "ward_neumann(rs=1, a=0.4)",
     "lafortune(ks=1, cx=-0.9, cy=-0.5, n=7.5)",
     "lafortune(ks=1, cx=0.6, cy=-1.3, n=1)",
     "edwards(ks=1, rx=0.4, ry=0.9, n=1.5)",
@@ -157,6 +159,29 @@ def test_chords_agree_with_rays(text, width):
     assert chords.met
     assert rays.met
     assert torch.allclose(chords.values, rays.values, rtol=0, atol=2e-12)
+
+
+@pytest.mark.parametrize("width", [1e-4, 0.02, 0.7, 10.0])
+def test_arcs_agree_with_rays(width):
+    """To 1e-12 at every angle; one of them, 30 degrees, at which two ends of the arcs' intervals meet."""
+    form, values = prepared(f"ward_neumann(rs=1, a={width})")
+    cosine = torch.cat([torch.linspace(0.05, 1, 8), torch.tensor([0.75**0.5, 0.8660]), 10.0 ** -torch.arange(2, 13)])
+    arcs, rays = (
+        bc.energy.of_form(form, values, cosine.double(), torch.tensor(0.9), 1e-12, m)
+        for m in ("closed_form", "slope_disc")
+    )
+    assert arcs.met
+    assert rays.met
+    assert arcs.evaluations < 0.2 * rays.evaluations
+    assert torch.allclose(arcs.values, rays.values, rtol=0, atol=2e-12)
+
+
+def test_arcs_are_of_isotropic_lobes():
+    """The anisotropic one is integrated along rays."""
+    form, values = prepared("ward_neumann(rs=1, ax=0.1, ay=0.3)")
+    assert bc.energy.of_form(form, values, torch.tensor(0.5), torch.tensor(0.0)).method == "slope_disc"
+    with pytest.raises(InvalidValueError, match="Expected method to suit ward_neumann, got closed_form"):
+        bc.energy.of_form(form, values, torch.tensor(0.5), torch.tensor(0.0), 1e-6, "closed_form")
 
 
 def test_the_chords_kernel():
