@@ -1,4 +1,4 @@
-"""Rendered images on disk, each named by the hash of what made it: renders/<hash>.png and .npy."""
+"""Rendered images on disk, each named by the hash of what made it: renders/<hash>.png, .npy and .exr."""
 
 import hashlib
 import json
@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import brdfcore as bc
 from brdfcore.errors import BrdfError, InvalidValueError, unknown_name
@@ -15,7 +15,8 @@ from brdfcore.render import SCENES, Scene, plan, render
 from .materials import real
 from .schemas import RenderRequest
 
-Kind = Literal["png", "npy"]
+Kind = Literal["png", "npy", "exr"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 RAYS = 2**22  # of the camera, at most: 4 million pixels of one ray
 PARTS = 64  # objects and lights together
 COST = 2e10  # term evaluations and ray tests: about an hour of one core
@@ -53,7 +54,7 @@ def made(asked: RenderRequest, data: Path, progress: Callable[[float], None]) ->
     image = render(scene, chosen, seed=asked.seed, progress=progress)
     name = _hash(scene, asked)
     (data / "renders").mkdir(exist_ok=True)
-    for kind in ("png", "npy"):
+    for kind in KINDS:
         draft = image.save(_path(data, f"{name}.{os.getpid()}", kind))
         draft.replace(_path(data, name, kind))  # whole or not at all, also where two jobs make the same
     return {
@@ -80,7 +81,7 @@ def content(data: Path, name: str, kind: Kind) -> bytes | None:
 
 def remove(data: Path, name: str) -> None:
     """Remove a kept image."""
-    for kind in ("png", "npy"):
+    for kind in KINDS:
         _path(data, name, kind).unlink(missing_ok=True)
 
 

@@ -7,7 +7,7 @@ from .calls import Call, content
 from .errors import JobUnfinishedError
 from .jobs import Awaited, Job, Waiting
 
-Kind = Literal["png", "npy"]
+Kind = Literal["png", "npy", "exr"]
 
 
 class _Render(Job[RenderView]):
@@ -35,7 +35,7 @@ class RenderResult(_Render, Waiting[RenderView, ProgressView]):
     """A render on the service."""
 
     def image(self, kind: Kind = "png") -> bytes:
-        """The image as the bytes of a PNG file, or of a NumPy file of linear radiance."""
+        """The image as the bytes of a PNG file, or as linear radiance of a NumPy or OpenEXR file."""
         return self._run(self._drawn(kind))
 
 
@@ -43,5 +43,5 @@ class AsyncRenderResult(_Render, Awaited[RenderView, ProgressView]):
     """The same, to be awaited."""
 
     async def image(self, kind: Kind = "png") -> bytes:
-        """The image as the bytes of a PNG file, or of a NumPy file of linear radiance."""
+        """The image as the bytes of a PNG file, or as linear radiance of a NumPy or OpenEXR file."""
         return await self._run(self._drawn(kind))

@@ -21,6 +21,7 @@ _JSON_LIMIT = 2**18  # bytes
 _MEDIA_TYPES: dict[renders.Kind, tuple[str, ...]] = {
     "png": ("image/png",),
     "npy": ("application/x-npy", "application/octet-stream"),
+    "exr": ("image/x-exr", "application/octet-stream"),
 }
 _BODY = {"required": True, "content": {"application/json": {"schema": inlined(RenderRequest)}}}
 
@@ -67,6 +68,12 @@ async def image_png(request: Request, render_id: str) -> Response:
 async def image_npy(request: Request, render_id: str) -> Response:
     """The linear radiance of every pixel, (height, width, 3) in single precision, as a NumPy file."""
     return await _image(request, render_id, "npy")
+
+
+@router.get("/{render_id}/image.exr", response_class=Response, responses=_file("exr"))
+async def image_exr(request: Request, render_id: str) -> Response:
+    """The same as an OpenEXR file."""
+    return await _image(request, render_id, "exr")
 
 
 @router.post("/{render_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 409, 422))

@@ -60,7 +60,7 @@ class PlanView(View):
 
 
 class RenderOutcome(View):
-    """A finished render, without its image: GET /v1/renders/{render_id}/image.png or .npy sends that."""
+    """A finished render, without its image: GET /v1/renders/{render_id}/image.png, .npy or .exr sends that."""
 
     hash: str = Field(description="of what made it: version, scene, tolerance and seed")
     version: str

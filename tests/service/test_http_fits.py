@@ -417,6 +417,7 @@ def test_openapi_has_every_route_and_its_errors(http: TestClient) -> None:
         "/v1/renders/{render_id}": ["delete", "get"],
         "/v1/renders/{render_id}/cancel": ["post"],
         "/v1/renders/{render_id}/events": ["get"],
+        "/v1/renders/{render_id}/image.exr": ["get"],
         "/v1/renders/{render_id}/image.npy": ["get"],
         "/v1/renders/{render_id}/image.png": ["get"],
         "/v1/sphere": ["post"],

@@ -80,15 +80,16 @@ def test_an_image_and_its_plan_are_the_librarys(http: TestClient, tmp_path: path
     assert result["noise"] == pytest.approx(float(own.noise.square().mean().sqrt()), rel=1e-9)
     assert result["noise"] > 0
     path = f"/v1/renders/{found['id']}/image"
-    as_npy, as_png = http.get(f"{path}.npy"), http.get(f"{path}.png")
+    as_npy, as_exr, as_png = (http.get(f"{path}.{kind}") for kind in ("npy", "exr", "png"))
     assert (as_npy.headers["content-type"], as_png.headers["content-type"]) == ("application/x-npy", "image/png")
     np.testing.assert_allclose(np.load(io.BytesIO(as_npy.content)), own.pixels.float().numpy(), rtol=1e-6)
     assert as_png.content == own.save(tmp_path / "own.png").read_bytes()
-    for answer, kind in ((as_npy, "npy"), (as_png, "png")):
+    assert as_exr.content == own.save(tmp_path / "own.exr").read_bytes()
+    for answer, kind in ((as_npy, "npy"), (as_exr, "exr"), (as_png, "png")):
         tag = answer.headers["etag"]
         known = http.get(f"{path}.{kind}", headers={"if-none-match": f'"other", W/{tag}'})
         assert (known.status_code, known.content, known.headers["etag"]) == (304, b"", tag)
-    assert as_npy.headers["etag"] != as_png.headers["etag"]
+    assert len({answer.headers["etag"] for answer in (as_npy, as_exr, as_png)}) == 3
     assert http.get(f"{path}.png", headers={"accept": "image/webp"}).status_code == 406
 
 
@@ -138,7 +139,7 @@ def test_the_same_image_is_not_made_twice(http: TestClient, settings: Settings) 
     first = finished(http, body)
     again = finished(http, body)
     assert (again["reused"], again["result"]) == (first["id"], first["result"])
-    kept = [settings.data / "renders" / f"{first['result']['hash']}.{kind}" for kind in ("png", "npy")]
+    kept = [settings.data / "renders" / f"{first['result']['hash']}.{kind}" for kind in ("png", "npy", "exr")]
     assert http.delete(f"/v1/renders/{first['id']}").status_code == 204
     assert http.get(f"/v1/renders/{again['id']}/image.png").status_code == 200, "another job still has it"
     kept[0].unlink()
@@ -191,6 +192,11 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
         {"scene": LONE | {"objects": [SPHERE | {"material": "lambet"}]}},
         "scene.objects[0].material",
         "Did you mean 'lambert'?",
+    ),
+    "a file of the server": (
+        {"scene": LONE | {"objects": [SPHERE | {"material": {"measured": "/etc/passwd"}}]}},
+        "scene.objects[0].material",
+        "Expected no measured file in a scene that is no file itself",
     ),
     "a camera inside": (
         {"scene": LONE | {"camera": CAMERA | {"position": [0, 0.1, 0]}}},
