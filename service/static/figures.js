@@ -30,9 +30,16 @@ function writeStylesAsObjects() {
   };
 }
 
-/** Fetch Plotly ahead of need, when the page has nothing else to do. */
+/** Fetch Plotly ahead of need, and draw a first figure that nobody sees, when the page has nothing else to do. */
 export function prepare() {
-  setTimeout(() => plotly().catch(() => undefined), 200);
+  setTimeout(() => plotly().then((library) => setTimeout(() => warm(library), 50)).catch(() => undefined), 200);
+}
+
+/** What a figure takes the first time, taken when nobody waits for it. @param {any} library */
+async function warm(library) {
+  const unseen = document.createElement("div");
+  await library.newPlot(unseen, [{ type: "scatter", mode: "lines+markers", x: [0, 1], y: [0, 1] }], { width: 200, height: 100 }, { displayModeBar: false });
+  library.purge(unseen);
 }
 
 /** The colours of the page as it stands, light or dark. */
