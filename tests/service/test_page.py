@@ -185,14 +185,33 @@ def test_a_dropped_file_is_asked_for_what_it_does_not_say(page: Any) -> None:
     expect(page, "#start").to_be_enabled()
 
 
+def test_a_table_without_a_header_is_asked_for_its_columns(page: Any, measured: pathlib.Path) -> None:
+    page.set_input_files("#file", measured / "satellite" / "chassis_brdf.csv")
+    expect(page, "#measurement-error").to_contain_text("chassis_brdf.csv: Expected the file to be of a known format")
+    expect(page, "#columns").to_be_focused()
+    page.fill("#columns", "phi_i,theta_i")
+    page.keyboard.press("Enter")
+    expect(page, "#measurement-error").to_contain_text("chassis_brdf.csv: Expected ")
+    page.fill("#columns", "theta_i,phi_i,theta_o,phi_o,value")
+    page.keyboard.press("Enter")
+    for answer in ("brdf", "degrees"):
+        page.check(f"#ask input[value={answer}]")
+        page.click("#ask button")
+    expect(page, "#about").to_contain_text("716")
+    expect(page, "#ask").to_be_hidden()
+    expect(page, "#measurement-error").to_be_hidden()
+
+
 def test_a_bad_file_and_a_bad_model_are_told_where_they_arose(page: Any, tmp_path: pathlib.Path) -> None:
     bad = tmp_path / "notes.txt"
     bad.write_text("hello\n")
     page.set_input_files("#file", bad)
     expect(page, "#measurement-error").to_contain_text("Expected the file to be of a known format")
+    expect(page, "#columns").to_be_visible()
     page.set_input_files("#file", DATA)
     expect(page, "#about").to_contain_text("222")
     expect(page, "#measurement-error").to_be_hidden()
+    expect(page, "#ask").to_be_hidden()
     only(page)
     expect(page, "#start").to_be_disabled()
     page.fill("#text", "lambert + wart")
