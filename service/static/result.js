@@ -80,7 +80,7 @@ function detail() {
     made("p", {}, made("b", {}, result.status === "converged" ? "Converged. " : "Stopped early. "), result.message),
   );
   if (result.chi_square) parts.push(made("p", {}, `Chi-square ${shown(result.chi_square[0])} for ${result.chi_square[1]} degrees of freedom.`));
-  if (result.conservation) parts.push(made("p", {}, conserved(result)));
+  if (result.conservation && !(result.conservation.free_max_albedo <= 1)) parts.push(made("p", {}, conserved(result)));
   if (result.ladder?.length) parts.push(made("h3", {}, "How it was chosen"), ladder(result.ladder));
   at("details").replaceChildren(...parts);
 }

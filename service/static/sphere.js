@@ -8,6 +8,8 @@ import { choose, chosen, on, ranked, state, valuesOf } from "./state.js";
 
 const SIZE = 200; // pixels, shown at half of it or more
 
+const MOST = 200; // pictures that are kept
+
 /** @type {Map<string, ImageBitmap>} spheres of fits as they were fitted */
 const known = new Map();
 
@@ -24,18 +26,20 @@ export function install() {
 /** @param {AbortSignal} signal */
 async function drawAll(signal) {
   const fits = ranked();
-  const images = await Promise.all(fits.map((fit) => sphereOf(fit, signal)));
-  if (signal.aborted) return;
+  const cards = fits.map(card);
   const focused = at("spheres").contains(document.activeElement);
-  at("spheres").replaceChildren(...fits.map((fit, k) => card(fit, k, images[k])));
+  at("spheres").replaceChildren(...cards.map(({ item }) => item));
   if (focused) at("spheres").querySelector('[aria-pressed="true"]')?.focus();
+  await Promise.all(fits.map(async (fit, k) => paint(cards[k].canvas, await sphereOf(fit, signal))));
+  complain("result-error", null);
 }
 
-/** A sphere that is pressed to look at its fit. @param {import("./state.js").Fit} fit @param {number} rank from 0 @param {ImageBitmap} image */
-function card(fit, rank, image) {
+/** A sphere that is pressed to look at its fit, empty at first. @param {import("./state.js").Fit} fit @param {number} rank from 0 */
+function card(fit, rank) {
+  const canvas = made("canvas", { class: "ball", "aria-hidden": "true" });
   const name = made("span", { class: "code" }, made("span", { class: `swatch swatch-${rank % SERIES}` }), `${rank + 1}. ${fit.result.model}`);
-  const button = made("button", { type: "button", class: "card-of-sphere", "aria-pressed": String(fit.id === state.chosen), onclick: () => choose(fit.id) }, canvas(image), name);
-  return made("li", {}, button);
+  const button = made("button", { type: "button", class: "card-of-sphere", "aria-pressed": String(fit.id === state.chosen), onclick: () => choose(fit.id) }, canvas, name);
+  return { item: made("li", {}, button), canvas };
 }
 
 /** @param {AbortSignal} signal */
@@ -58,19 +62,13 @@ async function sphereOf(fit, signal) {
   const name = `${fit.id} ${state.channel}`;
   const before = byHand ? undefined : known.get(name);
   if (before) return before;
+  if (known.size > MOST) known.clear();
   const material = { ...fit.result.material, values: valuesOf(fit) };
   const json = { material, channels: fit.result.channels, channel: state.channel, size: SIZE };
   const answer = await ask("/v1/sphere", { method: "POST", json, signal });
   const image = await createImageBitmap(await answer.blob());
   if (!byHand) known.set(name, image);
   return image;
-}
-
-/** @param {ImageBitmap} image */
-function canvas(image) {
-  const element = made("canvas", { class: "ball", "aria-hidden": "true" });
-  paint(element, image);
-  return element;
 }
 
 /** @param {HTMLCanvasElement} element @param {ImageBitmap} image */

@@ -30,8 +30,9 @@ function show() {
       made("b", {}, "Files"),
       button("Report", async () => save(new Blob([fit.result.report], { type: "text/plain" }), `${fit.id}.txt`)),
       button("Result as JSON", async () => save(new Blob([JSON.stringify(fit.result, null, 2)], { type: "application/json" }), `${fit.id}.json`)),
-      ...formats.map((format) => button(format, () => exported(fit, format))),
+      ...formats.map((format) => offered(fit, format)),
     ),
+    ...(drawable(fit) ? [] : [made("p", { class: "hint" }, `The files of other programs hold one channel, or red, green and blue; this material has ${fit.result.channels.length}.`)]),
     made("div", { class: "row" },
       made("b", {}, "Figures"), ...figures,
       button("residuals SVG", async () => save(await svg(at("residuals")), `${fit.id}_residuals.svg`)),
@@ -51,6 +52,19 @@ function button(text, action) {
     await action().catch((error) => complain("take-error", error));
   };
   return made("button", { type: "button", class: "small", onclick: press }, text);
+}
+
+/** @param {import("./state.js").Fit} fit @returns {boolean} whether other programs have its number of channels */
+function drawable(fit) {
+  const values = /** @type {any[]} */ (Object.values(fit.result.material.values));
+  return [1, 3].includes(Math.max(...values.map((value) => (Array.isArray(value) ? value.length : 1))));
+}
+
+/** @param {import("./state.js").Fit} fit @param {string} format */
+function offered(fit, format) {
+  const element = button(format, () => exported(fit, format));
+  element.disabled = format !== "json" && !drawable(fit);
+  return element;
 }
 
 /** @param {string} id of a canvas @param {string} name of the file */

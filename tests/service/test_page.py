@@ -34,6 +34,13 @@ ARGUMENTS = [
 KEY = "k" * 24
 SOLID = "document.getElementById('solid').toDataURL()"
 BALL = "document.getElementById('sphere').toDataURL()"
+# red, green and blue between the sphere's highlights
+MIDDLE = """() => {
+  const copy = new OffscreenCanvas(200, 200).getContext("2d", { willReadFrequently: true });
+  copy.drawImage(document.getElementById("sphere"), 0, 0);
+  const [red, green, blue] = copy.getImageData(60, 120, 1, 1).data;
+  return red && [red, green, blue];
+}"""
 SOON = 30_000  # a fit and its figures on a busy machine [ms]
 SLOW = "lambert + kurt(anisotropic) + ggx + kurt"
 SLOWER = f"{SLOW} + beckmann + cook_torrance + kurt + ward"  # so that it is there to be cancelled
@@ -160,6 +167,10 @@ def test_a_measurement_of_many_channels_from_file_to_figure(page: Any, measured:
     expect(page, "#details table tbody tr").to_have_count(3)
     expect(page, "#details").to_contain_text("lambert.kd (700)")
     expect(page, "#hand-said").to_contain_text("Error (cosine_rms)")
+    red, green, blue = page.wait_for_function(MIDDLE).json_value()
+    assert red > 20 > max(green, blue), "garnet is red"
+    playwright.expect(page.get_by_role("button", name="radiance", exact=True)).to_be_disabled()
+    expect(page, "#taking").to_contain_text("hold one channel, or red, green and blue; this material has 31.")
     with page.expect_download() as download:
         page.get_by_role("button", name="albedo PNG").click()
     assert pathlib.Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
