@@ -1,7 +1,6 @@
 """What every part of a scene checks: numbers, vectors and colours, each with one sentence that names the field."""
 
 import math
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,6 +10,7 @@ from torch import Tensor
 from ..errors import BrdfError, InvalidValueError
 
 Vector = tuple[float, float, float]
+LARGEST = 1e30  # of a number, so that no product of several overflows
 Colour = float | Sequence[float] | Tensor  # one number, or red, green and blue
 
 
@@ -19,7 +19,8 @@ def vector(name: str, value: object) -> Vector:
     if isinstance(value, list | tuple) and len(value) == 3 and all(map(_finite, value)):
         return (float(value[0]), float(value[1]), float(value[2]))
     raise InvalidValueError(
-        f"Expected {name} to be three finite numbers, got {value!r}. Write it as [x, y, z].", field=name
+        f"Expected {name} to be three finite numbers, none beyond 1e30, got {value!r}. Write it as [x, y, z].",
+        field=name,
     )
 
 
@@ -39,7 +40,7 @@ def positive(name: str, value: object) -> float:
     if _finite(value) and value > 0:  # type: ignore[operator]
         return float(value)  # type: ignore[arg-type]
     raise InvalidValueError(
-        f"Expected {name} to be a finite number above 0, got {value!r}. Give it a size.", field=name
+        f"Expected {name} to be a finite number above 0 and up to 1e30, got {value!r}. Give it a size.", field=name
     )
 
 
@@ -61,7 +62,7 @@ def colour(name: str, value: object) -> Colour:
     if len(numbers) in (1, 3) and all(_finite(x) and x >= 0 for x in numbers):
         return value  # type: ignore[return-value]
     raise InvalidValueError(
-        f"Expected {name} to be one number or three, finite and not negative, got {value!r}. "
+        f"Expected {name} to be one number or three, finite, not negative and up to 1e30, got {value!r}. "
         "Give red, green and blue, or one number.",
         field=name,
     )
@@ -91,5 +92,4 @@ def located(error: BrdfError, where: str) -> BrdfError:
 
 
 def _finite(x: object) -> bool:
-    # compared, because a whole number may be too large for math.isfinite
-    return isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= sys.float_info.max
+    return isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST
