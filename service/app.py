@@ -11,6 +11,7 @@ from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
+from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 from starlette.types import ASGIApp
 
 import brdfcore as bc
@@ -27,6 +28,8 @@ from .settings import Settings
 from .state import State
 
 _log = logging.getLogger("service")
+_LARGE = 2**14  # bytes from which an answer is compressed for who admits it
+_PACKED = (*DEFAULT_EXCLUDED_CONTENT_TYPES, "application/x-npz", "application/x-npy", "application/octet-stream")
 
 
 def _runner(settings: Settings) -> Runner:
@@ -110,6 +113,12 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.ending = lambda: False
     app.state.metrics, app.state.settings = metrics, chosen
     errors.install(app)
+    app.add_middleware(
+        GZipMiddleware,
+        minimum_size=_LARGE,
+        compresslevel=5,
+        exclude_content_types=_PACKED,  # and never a stream of events
+    )
     for router in ROUTERS:
         app.include_router(router)
     return app

@@ -66,6 +66,7 @@ PARAMETERS: dict[str, Any] = {
     "scale": "log",
     "theta_i_deg": [30, 60],
     "channel": "r",
+    "rank": 1,
     "phi_deg": 0,
     "last-event-id": "1.running.0.5000",
 }

@@ -1,5 +1,7 @@
 """The material that a request means."""
 
+import math
+import sys
 from typing import Any
 
 import brdfcore as bc
@@ -22,4 +24,7 @@ def real(given: Any) -> Any:
         return {key: real(value) for key, value in given.items()}
     if isinstance(given, list):
         return [real(value) for value in given]
-    return float(given) if type(given) is int else given
+    if type(given) is not int:
+        return given
+    # what no number holds is infinite, which is refused as any other
+    return float(given) if abs(given) <= sys.float_info.max else math.inf if given > 0 else -math.inf

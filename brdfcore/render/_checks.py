@@ -10,7 +10,7 @@ from torch import Tensor
 from ..errors import BrdfError, InvalidValueError
 
 Vector = tuple[float, float, float]
-LARGEST = 1e60  # of any length or strength: squares and their products stay finite
+LARGEST = 1e30  # of a number, so that no product of several overflows
 Colour = float | Sequence[float] | Tensor  # one number, or red, green and blue
 
 
@@ -19,7 +19,7 @@ def vector(name: str, value: object) -> Vector:
     if isinstance(value, list | tuple) and len(value) == 3 and all(map(_finite, value)):
         return (float(value[0]), float(value[1]), float(value[2]))
     raise InvalidValueError(
-        f"Expected {name} to be three finite numbers, got {value!r}. Write it as [x, y, z], none beyond {LARGEST:g}.",
+        f"Expected {name} to be three finite numbers, none beyond 1e30, got {value!r}. Write it as [x, y, z].",
         field=name,
     )
 
@@ -40,8 +40,7 @@ def positive(name: str, value: object) -> float:
     if _finite(value) and value > 0:  # type: ignore[operator]
         return float(value)  # type: ignore[arg-type]
     raise InvalidValueError(
-        f"Expected {name} to be a finite number above 0, got {value!r}. Give it a size, up to {LARGEST:g}.",
-        field=name,
+        f"Expected {name} to be a finite number above 0 and up to 1e30, got {value!r}. Give it a size.", field=name
     )
 
 
@@ -78,8 +77,8 @@ def colour(name: str, value: object) -> Colour:
     if len(numbers) in (1, 3) and all(_finite(x) and x >= 0 for x in numbers):
         return value  # type: ignore[return-value]
     raise InvalidValueError(
-        f"Expected {name} to be one number or three, finite and not negative, got {value!r}. "
-        f"Give red, green and blue, or one number, up to {LARGEST:g}.",
+        f"Expected {name} to be one number or three, finite, not negative and up to 1e30, got {value!r}. "
+        "Give red, green and blue, or one number.",
         field=name,
     )
 
@@ -108,4 +107,4 @@ def located(error: BrdfError, where: str) -> BrdfError:
 
 
 def _finite(x: object) -> bool:
-    return isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST  # nan is not
+    return isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST

@@ -91,7 +91,7 @@ async def json_accepted(request: Request) -> None:
 def unchanged(request: Request, tag: str) -> bool:
     """Whether the client has what an entity tag names, by its If-None-Match; a 304 says so."""
     known = [name.strip().removeprefix("W/") for name in request.headers.get("if-none-match", "").split(",")]
-    return tag in known or "*" in known
+    return tag.removeprefix("W/") in known or "*" in known
 
 
 def _quality(accept: str, media_type: str) -> float:

@@ -14,15 +14,24 @@ from fastapi import Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 import brdfcore as bc
+from brdfcore.errors import InvalidValueError
 
 from ..errors import ProblemError
 from ..jobs.records import BrokenPromiseError, Job, Promise, QueueFullError
-from ..schemas import FINISHED, JobKind, JobStatus
+from ..schemas import FINISHED, FitOutcome, JobKind, JobStatus
 from ..state import State, state
 
 _LONGEST_WAIT = 60.0  # [s]
 _NAME: dict[JobKind, str] = {"fit": "fit", "albedo_table": "table of albedos", "render": "render"}
 _PATH: dict[JobKind, str] = {"fit": "/v1/fits", "albedo_table": "/v1/albedo", "render": "/v1/renders"}
+
+
+class Ranked(BaseModel):
+    """Which of the models is meant, where several were compared."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    rank: int = Field(1, ge=1, le=32, description="of the model, where several were compared; 1 is the best")
 
 
 class Page(BaseModel):
@@ -174,6 +183,19 @@ def summary(job: Job) -> dict[str, Any]:
 def view(job: Job) -> dict[str, Any]:
     """The summary and the result."""
     return {**summary(job), "result": json.loads(job.result) if job.result else None}
+
+
+def outcome_of(result: str, rank: int) -> FitOutcome:
+    """What a fit found: of several models that were compared, that of a rank from 1; 422 where there is none."""
+    found = json.loads(result)
+    fits = [one["fit"] for one in found["comparison"]["ranking"]] if "comparison" in found else [found]
+    if rank > len(fits):
+        raise InvalidValueError(
+            f"Expected rank to be at most {len(fits)}, the number of models that were fitted, got {rank}. "
+            "GET the fit for its ranking.",
+            field="rank",
+        )
+    return FitOutcome.model_validate(fits[rank - 1])
 
 
 def _preferred_wait(request: Request) -> float | None:

@@ -3,17 +3,16 @@
 import asyncio
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 
 import brdfcore as bc
 from brdfcore.errors import unknown_name
 from brdfcore.exports import EXPORTS, Export
 
 from ..errors import ProblemError, responses
-from ..schemas import FitOutcome
 from ..state import state
 from ._http import require_accepted
-from ._jobs import found
+from ._jobs import Ranked, found, outcome_of
 
 router = APIRouter(prefix="/v1/fits/{fit_id}/export", tags=["exports"])
 
@@ -35,6 +34,7 @@ async def export(
     request: Request,
     fit_id: str,
     format: Annotated[str, Path(json_schema_extra={"enum": list(EXPORTS)})],  # noqa: A002 - the path's own name
+    asked: Annotated[Ranked, Query()],
 ) -> Response:
     """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json, its difference in a header."""
     if format not in EXPORTS:
@@ -48,7 +48,9 @@ async def export(
             409,
             f"Expected the fit to have succeeded, but it is {job.status}. An export needs a fit that has succeeded.",
         )
-    made = await asyncio.get_running_loop().run_in_executor(service.computing, _exported, job.result, format)
+    made = await asyncio.get_running_loop().run_in_executor(
+        service.computing, _exported, job.result, asked.rank, format
+    )
     headers = {
         "content-disposition": f'attachment; filename="fit_{fit_id}{exporter.suffix}"',
         "x-brdf-difference": repr(made.difference),
@@ -57,6 +59,5 @@ async def export(
     return Response(made.to_bytes(), headers=headers, media_type=exporter.media_type)
 
 
-def _exported(result: str, name: str) -> Export:
-    outcome = FitOutcome.model_validate_json(result)
-    return bc.export(bc.Material.from_json(outcome.material), name)
+def _exported(result: str, rank: int, name: str) -> Export:
+    return bc.export(bc.Material.from_json(outcome_of(result, rank).material), name)

@@ -5,7 +5,7 @@ import hashlib
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 import brdfcore as bc
 from brdfcore import plots
@@ -15,7 +15,7 @@ from ..errors import ProblemError, responses
 from ..schemas import FitOutcome, FitRequest
 from ..state import State, state
 from ._http import require_accepted, unchanged
-from ._jobs import absent, found
+from ._jobs import Ranked, absent, found, outcome_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,29 +27,23 @@ _MEDIA_TYPE: dict[Kind, str] = {"svg": "image/svg+xml", "png": "image/png"}
 Angle = Annotated[float, Field(ge=0, lt=90)]
 
 
-class Lobes(BaseModel):
+class Lobes(Ranked):
     """What a plot of lobes shows."""
-
-    model_config = ConfigDict(extra="forbid")
 
     scale: Literal["linear", "cube_root", "log"] = Field("linear", description="of the radius")
     theta_i_deg: list[Angle] = Field([], max_length=12, description="angles of incidence; the data's, if none")
     channel: str | None = Field(None, description="which is drawn; the brightest, if none")
 
 
-class Albedo(BaseModel):
+class Albedo(Ranked):
     """What a plot of the albedo shows."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     phi_deg: float = Field(0.0, description="azimuth from which the sample is seen [degrees]")
     channel: str | None = Field(None, description="which is drawn; the brightest, if none")
 
 
-class Residuals(BaseModel):
+class Residuals(Ranked):
     """What a plot of residuals shows."""
-
-    model_config = ConfigDict(extra="forbid")
 
     channel: str | None = Field(None, description="which is drawn; the brightest, if none")
 
@@ -102,7 +96,7 @@ async def _plot(request: Request, fit_id: str, asked: Asked, kind: Kind) -> Resp
             409, f"Expected the fit to have succeeded, but it is {job.status}. A plot needs a fit that has succeeded."
         )
     shown = f"{bc.__version__} {job.id} {job.finished} {kind} {type(asked).__name__} {asked.model_dump_json()}"
-    tag = f'"{hashlib.sha256(shown.encode()).hexdigest()[:32]}"'
+    tag = f'W/"{hashlib.sha256(shown.encode()).hexdigest()[:32]}"'
     headers = {"etag": tag, "cache-control": "private, no-cache"}
     if unchanged(request, tag):
         return Response(status_code=304, headers=headers)
@@ -115,7 +109,7 @@ async def _plot(request: Request, fit_id: str, asked: Asked, kind: Kind) -> Resp
 
 
 def _drawn(service: State, body: bytes, result: str, asked: Asked, kind: Kind) -> bytes:
-    outcome = FitOutcome.model_validate_json(result)
+    outcome = outcome_of(result, asked.rank)
     material = bc.Material.from_json(outcome.material)
     if isinstance(asked, Albedo):
         return plots.to_bytes(_albedo(material, outcome, asked), kind)

@@ -1,8 +1,5 @@
 /** Plotly, fetched when the first figure is drawn, in the page's own colours. */
 
-/** Id of the sheet of Plotly's maps; an element that has it keeps Plotly from adding that sheet, which the policy forbids. */
-const MAP_RULES = "ce8d464691048653ffe3a57c6c18ab566e8366f186677868cf724621a857b4fe";
-
 export const SERIES = 6; // colours of curves, in the order of the ranking
 
 /** @type {Promise<any> | null} */
@@ -13,8 +10,7 @@ function plotly() {
   fetched ??= new Promise((done, fail) => {
     writeStylesAsObjects();
     const script = document.createElement("script");
-    script.src = "/static/plotly/plotly.min.js";
-    script.id = MAP_RULES;
+    script.src = "/static/plotly/plotly-basic.min.js";
     script.onload = () => done(/** @type {any} */ (window).Plotly);
     script.onerror = () => {
       fetched = null;
@@ -34,9 +30,16 @@ function writeStylesAsObjects() {
   };
 }
 
-/** Fetch Plotly ahead of need, when the page has nothing else to do. */
+/** Fetch Plotly ahead of need, and draw a first figure that nobody sees, when the page has nothing else to do. */
 export function prepare() {
-  setTimeout(() => plotly().catch(() => undefined), 200);
+  setTimeout(() => plotly().then((library) => setTimeout(() => warm(library), 50)).catch(() => undefined), 200);
+}
+
+/** What a figure takes the first time, taken when nobody waits for it. @param {any} library */
+async function warm(library) {
+  const unseen = document.createElement("div");
+  await library.newPlot(unseen, [{ type: "scatter", mode: "lines+markers", x: [0, 1], y: [0, 1] }], { width: 200, height: 100 }, { displayModeBar: false });
+  library.purge(unseen);
 }
 
 /** The colours of the page as it stands, light or dark. */
@@ -57,6 +60,7 @@ export function colours() {
  */
 export async function draw(element, traces, layout) {
   const library = await plotly();
+  await new Promise((done) => setTimeout(done)); // figures that are drawn together do not make one long stall
   const { ink, soft, line } = colours();
   const axis = { gridcolor: line, linecolor: soft, zerolinecolor: line, tickfont: { color: soft, size: 12 } };
   const whole = {

@@ -126,7 +126,7 @@ function arrived(fit) {
   state.fits.set(fit.id, fit);
   changed("fits");
   const best = ranked()[0];
-  if (fit.result && (state.chosen === null || (best?.id === fit.id && state.values === null))) choose(fit.id);
+  if (best && fit.result && (state.chosen === null || ((best.job ?? best.id) === fit.id && state.values === null))) choose(best.id);
 }
 
 /** A small drawing of how the loss falls, its scale logarithmic. @param {string} name */

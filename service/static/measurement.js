@@ -17,6 +17,10 @@ const QUESTIONS = {
   angle_unit: ["In what are the angles?", [["degrees", "degrees"], ["radians", "radians"]]],
 };
 
+/** What is asked where a file is of no known format, or names no columns; the answer is text. */
+const COLUMNS = "columns";
+const USUAL = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value";
+
 /** Listen to the drop zone, the file field and the example's button. */
 export function install() {
   const drop = at("drop");
@@ -65,9 +69,11 @@ async function take(file, declared = {}, remark = "") {
     await show(dataset);
   } catch (error) {
     at("measurement-said").textContent = "";
-    const field = error instanceof Refusal ? error.field : null;
-    if (field !== null && field in QUESTIONS && !(field in declared)) question(file, declared, field);
-    else complain("measurement-error", error);
+    const field = error instanceof Refusal ? (error.field === "format" ? COLUMNS : error.field) : null;
+    const open = field !== null && field in QUESTIONS && !(field in declared);
+    if (open) question(file, declared, field);
+    if (field === COLUMNS) nameColumns(file, declared);
+    if (!open) complain("measurement-error", `${file.name}: ${inShort(error)}`);
   } finally {
     at("file").value = ""; // so that the same file can be chosen again
   }
@@ -83,17 +89,40 @@ function question(file, declared, field) {
   const choices = answers.map(([value, meaning]) =>
     made("label", { class: "check" }, made("input", { type: "radio", name: field, value, required: true }), meaning),
   );
-  const form = at("ask");
-  form.replaceChildren(
+  const parts = [
     made("fieldset", {}, made("legend", {}, `${file.name} does not say: ${text}`), ...choices),
     made("button", { type: "submit", class: "primary" }, "Go on"),
-  );
+  ];
+  asking(parts, () => take(file, { ...declared, [field]: String(new FormData(at("ask")).get(field)) }));
+}
+
+/** @param {File} file @param {Record<string, string>} declared */
+function nameColumns(file, declared) {
+  const input = made("input", { type: "text", id: COLUMNS, name: COLUMNS, required: true, autocomplete: "off", spellcheck: "false", value: declared[COLUMNS] ?? USUAL, "aria-describedby": "columns-hint" });
+  const parts = [
+    made("label", { for: COLUMNS }, "If it is a table of numbers, what are its columns, from the left?"),
+    made("div", { class: "row" }, input, made("button", { type: "submit", class: "primary" }, "Read it so")),
+    made("p", { class: "hint", id: "columns-hint" }, "Four angles, or wi_x to wo_z, in any order, and a name for each value. Without _deg or _rad, the unit is asked for."),
+  ];
+  asking(parts, () => take(file, { ...declared, [COLUMNS]: input.value.trim() }));
+}
+
+/** Ask in the form under the drop zone. @param {Node[]} parts @param {() => void} answered */
+function asking(parts, answered) {
+  const form = at("ask");
+  form.replaceChildren(...parts);
   form.onsubmit = (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
-    take(file, { ...declared, [field]: String(new FormData(form).get(field)) });
+    answered();
   };
   form.hidden = false;
   form.querySelector("input").focus();
+}
+
+/** The sentence of an error; of formats that it lists, the names only. @param {unknown} error */
+function inShort(error) {
+  const [sentence, known] = (error instanceof Error ? error.message : String(error)).split(" Known: ");
+  return known === undefined ? sentence : `${sentence} Known: ${known.split("; ").map((one) => one.split(" ")[0]).join(", ")}.`;
 }
 
 /**

@@ -6,6 +6,7 @@ import { colours, draw } from "./figures.js";
 import { radius, rings } from "./scale.js";
 import { state } from "./state.js";
 
+const SPOKES = [-90, -60, -30, 0, 30, 60, 90]; // degrees
 const NEAR = 3; // a measured point is drawn where its light is so close to the one chosen [degrees]
 
 /** @typedef {{name: string, angles: number[], f: (number | null)[], chosen: boolean}} Curve */
@@ -20,28 +21,52 @@ export async function drawPolar(curves) {
   const top = Math.max(...curves.flatMap((curve) => curve.f.map((value) => value ?? 0)), ...points.map((point) => point.value));
   const r = radius(state.scale, top);
   const traces = curves.map(({ name, angles, f, chosen }, k) => ({
-    type: "scatterpolar", mode: "lines", name, theta: angles, r: f.map(r), text: f.map(shown),
+    type: "scatter", mode: "lines", name, ...placed(angles, f.map(r)), customdata: angles, text: f.map(shown),
     line: { color: series[k % series.length], width: chosen ? 2.6 : 1.3, dash: chosen ? "solid" : "dot" },
-    hovertemplate: "%{theta:.1f}°: %{text} 1/sr<extra>%{fullData.name}</extra>",
+    hovertemplate: "%{customdata:.1f}°: %{text} 1/sr<extra>%{fullData.name}</extra>",
   }));
   traces.sort((a, b) => a.line.width - b.line.width);
-  const light = { type: "scatterpolar", mode: "lines", theta: [-state.theta, 0], r: [1, 0], hoverinfo: "skip", line: { color: soft, width: 1.2, dash: "dash" } };
+  const { tickvals, ticktext } = rings(state.scale, top);
+  const plain = { type: "scatter", mode: "lines", hoverinfo: "skip" };
+  const light = { ...plain, ...placed([-state.theta, 0], [1, 0]), line: { color: soft, width: 1.2, dash: "dash" } };
   const dots = {
-    type: "scatterpolar", mode: "markers", name: "measured", theta: points.map((point) => point.angle), r: points.map((point) => r(point.value)),
-    text: points.map((point) => shown(point.value)), marker: { size: 6.5, color: "rgba(0,0,0,0)", line: { color: ink, width: 1.4 } },
-    hovertemplate: "%{theta:.1f}°: %{text} 1/sr<extra>measured</extra>",
+    type: "scatter", mode: "markers", name: "measured", ...placed(points.map((point) => point.angle), points.map((point) => r(point.value))),
+    customdata: points.map((point) => point.angle), text: points.map((point) => shown(point.value)),
+    marker: { size: 6.5, color: "rgba(0,0,0,0)", line: { color: ink, width: 1.4 } },
+    hovertemplate: "%{customdata:.1f}°: %{text} 1/sr<extra>measured</extra>",
   };
-  const axis = { gridcolor: line, linecolor: soft, tickfont: { color: soft, size: 11.5 } };
-  await draw(at("polar"), [light, ...traces, dots], {
-    margin: { l: 30, r: 30, t: 26, b: 10 },
-    polar: {
-      bgcolor: "rgba(0,0,0,0)", sector: [0, 180],
-      angularaxis: { ...axis, rotation: 90, direction: "clockwise", tickvals: [-90, -60, -30, 0, 30, 60, 90], ticktext: ["90°", "60°", "30°", "0°", "30°", "60°", "90°"] },
-      radialaxis: { ...axis, range: [0, 1.04], angle: 0, tickangle: 0, ...rings(state.scale, top) },
-    },
+  const word = { showarrow: false, font: { color: soft, size: 11.5 } };
+  const beside = SPOKES.map((angle) => ({ ...word, ...spot(angle, 1.09), text: `${Math.abs(angle)}°`, yshift: Math.abs(angle) === 90 ? 6 : 0 }));
+  const below = tickvals.map((value, k) => ({ ...word, x: value, y: 0, yanchor: "top", text: ticktext[k] }));
+  const axis = { visible: false, fixedrange: true, constrain: "domain" };
+  await draw(at("polar"), [{ ...plain, ...grid(tickvals), line: { color: line, width: 1 } }, light, ...traces, dots], {
+    margin: { l: 8, r: 8, t: 6, b: 18 },
+    xaxis: { ...axis, range: [-1.17, 1.17] }, yaxis: { ...axis, range: [0, 1.16], scaleanchor: "x" },
+    annotations: [...beside, ...below],
   });
   at("polar-title").textContent = `In the plane of incidence, light at ${shown(state.theta)}°`
     + (points.length ? `: ${points.length} measured` : state.samples ? ": none measured" : "");
+}
+
+/** The point at an angle from the normal, which points up; a positive one is to the right. @param {number} angle @param {number} radius */
+function spot(angle, radius) {
+  const turn = (angle * Math.PI) / 180;
+  return { x: radius * Math.sin(turn), y: radius * Math.cos(turn) };
+}
+
+/** @param {number[]} angles @param {number[]} radii @returns {{x: any[], y: any[]}} */
+function placed(angles, radii) {
+  const spots = angles.map((angle, k) => spot(angle, radii[k]));
+  return { x: spots.map((one) => one.x), y: spots.map((one) => one.y) };
+}
+
+/** Rings, the horizon and a spoke every 30 degrees, as one line with gaps. @param {number[]} radii @returns {{x: any[], y: any[]}} */
+function grid(radii) {
+  const around = Array.from({ length: 61 }, (_, k) => 3 * k - 90);
+  const arcs = [...radii, 1].map((radius) => placed(around, around.map(() => radius)));
+  const parts = [...arcs, ...SPOKES.map((angle) => placed([angle, angle], [0, 1])), placed([-90, 90], [1, 1])];
+  const joined = (/** @type {"x" | "y"} */ name) => parts.flatMap((part) => [...part[name], null]);
+  return { x: joined("x"), y: joined("y") };
 }
 
 /**

@@ -34,10 +34,15 @@ function rank() {
   const shownTable = table("Models, the best first, with their errors under every loss", ["Rank", "Model", ...heads, "Energy", "Time#"], rows);
   const chosenRow = fits.findIndex((fit) => fit.id === state.chosen);
   shownTable.querySelectorAll("tbody tr")[chosenRow]?.classList.add("chosen");
-  const several = fits.length > 1 ? made("p", { class: "hint" }, `Ranked by the loss that was minimised, ${fits[0].result.loss}; the lowest error of a column is bold.`) : null;
+  const several = fits.length > 1 ? made("p", { class: "hint" }, `Ranked by what was minimised, ${minimised(fits[0].result)}; the lowest error of a column is bold.`) : null;
   const focused = document.activeElement?.getAttribute("name") === "chosen-fit";
   at("ranking").replaceChildren(shownTable, ...(several ? [several] : []));
   if (focused) at("ranking").querySelector("input:checked")?.focus();
+}
+
+/** @param {any} result */
+function minimised({ loss, chi_square }) {
+  return chi_square ? `the ${loss} loss with every sample weighted by its stated error` : `the ${loss} loss`;
 }
 
 /** @param {import("./state.js").Fit} fit @param {number} rank from 0, which is the colour of its curves */
@@ -75,7 +80,7 @@ function detail() {
     made("p", {}, made("b", {}, result.status === "converged" ? "Converged. " : "Stopped early. "), result.message),
   );
   if (result.chi_square) parts.push(made("p", {}, `Chi-square ${shown(result.chi_square[0])} for ${result.chi_square[1]} degrees of freedom.`));
-  if (result.conservation) parts.push(made("p", {}, conserved(result)));
+  if (result.conservation && !(result.conservation.free_max_albedo <= 1)) parts.push(made("p", {}, conserved(result)));
   if (result.ladder?.length) parts.push(made("h3", {}, "How it was chosen"), ladder(result.ladder));
   at("details").replaceChildren(...parts);
 }

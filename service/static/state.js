@@ -2,7 +2,8 @@
 
 /**
  * @typedef {{id: string, bytes: number, report: any}} Dataset as GET /v1/datasets/{id} gives it
- * @typedef {{id: string, status: string, progress: any, error: string | null, request: any, result: any}} Fit
+ * @typedef {{id: string, status: string, progress: any, error: string | null, request: any, result: any, job?: string,
+ *   rank?: number}} Fit as GET /v1/fits/{id} gives it; or one of several that a job compared, with that job and its rank
  * @typedef {{count: number, stride: number, channels: string[], theta_i_deg: number[], phi_i_deg: number[],
  *   theta_o_deg: number[], phi_o_deg: number[], values: (number | null)[][]}} Samples
  */
@@ -16,7 +17,7 @@ export const state = {
   models: [],
   /** @type {Map<string, Fit>} the fits on the page by id, in the order in which they were asked for */
   fits: new Map(),
-  /** @type {string | null} id of the fit that is looked at */
+  /** @type {string | null} id of the fit that is looked at, one of `ranked` */
   chosen: null,
   channel: 0,
   /** @type {"linear" | "cube_root" | "log"} */
@@ -48,14 +49,26 @@ export function changed(topic) {
 
 /** @returns {Fit | null} the fit that is looked at, once it has a result */
 export function chosen() {
-  const fit = state.chosen === null ? undefined : state.fits.get(state.chosen);
-  return fit?.result ? fit : null;
+  return ranked().find((fit) => fit.id === state.chosen) ?? null;
 }
 
 /** @returns {Fit[]} those with a result, that with the lowest value of their loss first */
 export function ranked() {
-  const done = [...state.fits.values()].filter((fit) => fit.result);
+  const done = [...state.fits.values()].filter((fit) => fit.result).flatMap(parts);
   return done.sort((a, b) => (a.result.objective ?? Infinity) - (b.result.objective ?? Infinity));
+}
+
+/** @type {WeakMap<Fit, Fit[]>} */
+const compared = new WeakMap();
+
+/** @param {Fit} fit @returns {Fit[]} the fits of a job that compared several models, or the lone one */
+function parts(fit) {
+  if (!fit.result.comparison) return [fit];
+  const found = compared.get(fit) ?? fit.result.comparison.ranking.map((/** @type {any} */ one) => ({
+    ...fit, id: `${fit.id}.${one.rank}`, job: fit.id, rank: one.rank, request: { ...fit.request, model: one.model, models: null }, result: one.fit,
+  }));
+  compared.set(fit, found);
+  return found;
 }
 
 /** @param {Fit} fit @returns {string} the text of the model that was asked for, or of the several that were compared */
@@ -67,7 +80,7 @@ export function nameOf(fit) {
 export function choose(id) {
   state.chosen = id;
   state.values = null;
-  const channels = state.fits.get(id)?.result?.channels.length ?? 1;
+  const channels = chosen()?.result.channels.length ?? 1;
   state.channel = Math.min(state.channel, channels - 1);
   changed("chosen");
 }

@@ -23,19 +23,21 @@ function show() {
   const fit = chosen();
   at("take").hidden = fit === null;
   if (fit === null) return;
-  const link = `${location.origin}/#fit=${fit.id}`;
+  const link = `${location.origin}/#fit=${fit.job ?? fit.id}`;
   const figures = ["lobes", "albedo"].flatMap((name) => ["svg", "png"].map((kind) => button(`${name} ${kind.toUpperCase()}`, () => plot(fit, name, kind))));
   at("taking").replaceChildren(
     made("div", { class: "row" },
       made("b", {}, "Files"),
       button("Report", async () => save(new Blob([fit.result.report], { type: "text/plain" }), `${fit.id}.txt`)),
       button("Result as JSON", async () => save(new Blob([JSON.stringify(fit.result, null, 2)], { type: "application/json" }), `${fit.id}.json`)),
-      ...formats.map((format) => button(format, () => exported(fit, format))),
+      ...formats.map((format) => offered(fit, format)),
     ),
+    ...(drawable(fit) ? [] : [made("p", { class: "hint" }, `The files of other programs hold one channel, or red, green and blue; this material has ${fit.result.channels.length}.`)]),
     made("div", { class: "row" },
       made("b", {}, "Figures"), ...figures,
       button("residuals SVG", async () => save(await svg(at("residuals")), `${fit.id}_residuals.svg`)),
-      button("lobe in space PNG", async () => at("solid").toBlob((/** @type {Blob} */ content) => save(content, `${fit.id}_lobe.png`))),
+      button("lobe in space PNG", () => picture("solid", `${fit.id}_lobe.png`)),
+      button("sphere PNG", () => picture("sphere", `${fit.id}_sphere.png`)),
     ),
     made("div", { class: "row" }, made("b", {}, "Link"), made("a", { href: link, id: "permalink" }, link), copy("Copy the link", () => link)),
     made("div", { class: "pair" }, code("Python", python(fit)), code("curl", curl(fit))),
@@ -52,18 +54,36 @@ function button(text, action) {
   return made("button", { type: "button", class: "small", onclick: press }, text);
 }
 
+/** @param {import("./state.js").Fit} fit @returns {boolean} whether other programs have its number of channels */
+function drawable(fit) {
+  const values = /** @type {any[]} */ (Object.values(fit.result.material.values));
+  return [1, 3].includes(Math.max(...values.map((value) => (Array.isArray(value) ? value.length : 1))));
+}
+
+/** @param {import("./state.js").Fit} fit @param {string} format */
+function offered(fit, format) {
+  const element = button(format, () => exported(fit, format));
+  element.disabled = format !== "json" && !drawable(fit);
+  return element;
+}
+
+/** @param {string} id of a canvas @param {string} name of the file */
+async function picture(id, name) {
+  at(id).toBlob((/** @type {Blob} */ content) => save(content, name));
+}
+
 /** @param {import("./state.js").Fit} fit @param {string} name @param {string} kind */
 async function plot(fit, name, kind) {
-  const asked = new URLSearchParams({ channel: fit.result.channels[state.channel] });
+  const asked = new URLSearchParams({ channel: fit.result.channels[state.channel], rank: String(fit.rank ?? 1) });
   if (name === "albedo") asked.set("phi_deg", String(state.phi));
   else asked.append("scale", state.scale), asked.append("theta_i_deg", String(state.theta));
-  const answer = await ask(`/v1/fits/${fit.id}/plots/${name}.${kind}?${asked}`);
+  const answer = await ask(`/v1/fits/${fit.job ?? fit.id}/plots/${name}.${kind}?${asked}`);
   save(await answer.blob(), `${fit.id}_${name}.${kind}`);
 }
 
 /** @param {import("./state.js").Fit} fit @param {string} format */
 async function exported(fit, format) {
-  const answer = await ask(`/v1/fits/${fit.id}/export/${format}`);
+  const answer = await ask(`/v1/fits/${fit.job ?? fit.id}/export/${format}?rank=${fit.rank ?? 1}`);
   const name = /filename="([^"]+)"/.exec(answer.headers.get("content-disposition") ?? "")?.[1];
   save(await answer.blob(), name ?? `${fit.id}.${format}`);
 }

@@ -169,3 +169,18 @@ def test_metrics_count_requests_jobs_and_failures(http: TestClient, request_body
         'brdf_request_seconds_count{method="POST",route="/v1/fits",status="200"} 2.0',
     ):
         assert line in text, line
+
+
+def test_large_answers_travel_compressed_where_that_helps(http: TestClient, request_body: dict[str, Any]) -> None:
+    large = http.get("/openapi.json")
+    assert large.headers["content-encoding"] == "gzip"
+    assert int(large.headers["content-length"]) < len(large.content) / 4
+    assert "content-encoding" not in http.get("/openapi.json", headers={"accept-encoding": "identity"}).headers
+    assert "content-encoding" not in http.get("/healthz").headers
+    fit = http.post("/v1/fits", json=request_body, headers={"prefer": "wait=20"}).json()["id"]
+    events = http.get(f"/v1/fits/{fit}/events", headers={"accept": "text/event-stream"})
+    image = http.get(f"/v1/fits/{fit}/plots/lobes.png")
+    drawing = http.get(f"/v1/fits/{fit}/plots/lobes.svg")
+    assert [one.headers.get("content-encoding") for one in (events, image, drawing)] == [None, None, "gzip"]
+    again = http.get(f"/v1/fits/{fit}/plots/lobes.svg", headers={"if-none-match": drawing.headers["etag"]})
+    assert again.status_code == 304

@@ -52,3 +52,21 @@ def test_what_has_not_succeeded_has_no_export(idle: TestClient, request_body: di
     answer = idle.get(f"/v1/fits/{queued['id']}/export/json")
     assert answer.status_code == 409
     assert "it is queued. An export needs a fit that has succeeded" in answer.json()["detail"]
+
+
+def test_of_compared_models_any_is_exported_and_drawn(http: TestClient, request_body: dict[str, Any]) -> None:
+    body = {"samples": request_body["samples"], "models": ["lambert", "lambert + ward_bounded"]}
+    fit = http.post("/v1/fits", json=body, headers={"prefer": "wait=30"}).json()
+    path = f"/v1/fits/{fit['id']}"
+    ranking = fit["result"]["comparison"]["ranking"]
+    for one in ranking:
+        found = http.get(f"{path}/export/json", params={"rank": one["rank"]}).json()
+        assert {name: found[name] for name in one["fit"]["material"]} == one["fit"]["material"]
+    drawn = [http.get(f"{path}/plots/albedo.png", params={"rank": rank}).content for rank in (1, 2)]
+    assert drawn[0] == http.get(f"{path}/plots/albedo.png").content != drawn[1]
+    for tail in ("export/json", "plots/lobes.svg"):
+        refused = http.get(f"{path}/{tail}", params={"rank": 3})
+        assert (refused.status_code, refused.json()["field"]) == (422, "rank")
+        assert (
+            "Expected rank to be at most 2, the number of models that were fitted, got 3." in refused.json()["detail"]
+        )

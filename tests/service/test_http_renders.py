@@ -169,6 +169,8 @@ def test_a_queued_render_is_cancelled_and_is_no_fit(idle: TestClient) -> None:
 
 
 SPHERE, CAMERA = LONE["objects"][0], LONE["camera"]
+HUGE = bc.material("lambert(kd=0.5)").to_json()
+HUGE["values"] = {"lambert.kd": 10**400}
 BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "no scene": ({"scene": None}, "scene", "string"),
     "an unknown scene": ({"scene": "kurt_figure_21"}, "scene", "Did you mean 'kurt_figure_12'?"),
@@ -181,12 +183,17 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "a negative size": (
         {"scene": LONE | {"objects": [SPHERE | {"radius": -1}]}},
         "scene.objects[0].radius",
-        "a finite number above 0, got -1",
+        "a finite number above 0 and up to 1e30, got -1",
     ),
     "a size beyond any": (
         {"scene": LONE | {"objects": [SPHERE | {"radius": 10**400}]}},
         "scene.objects[0].radius",
-        "a finite number above 0",
+        "a finite number above 0 and up to 1e30",
+    ),
+    "a material's value beyond any": (
+        {"scene": LONE | {"objects": [SPHERE | {"material": HUGE}]}},
+        "scene.objects[0].material",
+        "lambert.kd",
     ),
     "an unknown material": (
         {"scene": LONE | {"objects": [SPHERE | {"material": "lambet"}]}},

@@ -7,8 +7,9 @@ import shutil
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
-from page_checks import LOW_CONTRASTS, UNLABELLED
+from page_checks import LOW_CONTRASTS, UNLABELLED, longest_task, unreached
 from service_cases import csv_file, measured_diffuser
 
 from brdfcore.cli.serve import background
@@ -32,6 +33,14 @@ ARGUMENTS = [
 ]
 KEY = "k" * 24
 SOLID = "document.getElementById('solid').toDataURL()"
+BALL = "document.getElementById('sphere').toDataURL()"
+# red, green and blue between the sphere's highlights
+MIDDLE = """() => {
+  const copy = new OffscreenCanvas(200, 200).getContext("2d", { willReadFrequently: true });
+  copy.drawImage(document.getElementById("sphere"), 0, 0);
+  const [red, green, blue] = copy.getImageData(60, 120, 1, 1).data;
+  return red && [red, green, blue];
+}"""
 SOON = 30_000  # a fit and its figures on a busy machine [ms]
 SLOW = "lambert + kurt(anisotropic) + ggx + kurt"
 SLOWER = f"{SLOW} + beckmann + cook_torrance + kurt + ward"  # so that it is there to be cancelled
@@ -106,16 +115,19 @@ def test_from_the_example_to_a_fit_again_by_keyboard_and_mouse(page: Any, url: s
     assert len(page.evaluate(SOLID)) > 5000
     assert page.evaluate(UNLABELLED) == []
     assert page.evaluate(LOW_CONTRASTS) == []
+    assert unreached(page) == []
 
     page.focus("#light-theta")
     page.keyboard.press("ArrowRight")
     expect(page, "#polar-title").to_contain_text("light at 45.5°")
     page.check("#scale-log")
     expect(page, "#hand-said").to_contain_text("Error (cosine_rms) 0.04929 1/sr.")
+    ball = page.evaluate(BALL)
     page.locator("#hand input").first.focus()
     for _ in range(3):
         page.keyboard.press("PageUp")
     expect(page, "#hand-said").to_contain_text("fitted 0.04929 1/sr")
+    page.wait_for_function("(before) => document.getElementById('sphere').toDataURL() !== before", arg=ball)
     page.click("#as-fitted")
     expect(page, "#hand-said").to_contain_text("Error (cosine_rms) 0.04929 1/sr.")
     assert page.evaluate("document.querySelector('table').innerText").startswith("Models")
@@ -155,6 +167,10 @@ def test_a_measurement_of_many_channels_from_file_to_figure(page: Any, measured:
     expect(page, "#details table tbody tr").to_have_count(3)
     expect(page, "#details").to_contain_text("lambert.kd (700)")
     expect(page, "#hand-said").to_contain_text("Error (cosine_rms)")
+    red, green, blue = page.wait_for_function(MIDDLE).json_value()
+    assert red > 20 > max(green, blue), "garnet is red"
+    playwright.expect(page.get_by_role("button", name="radiance", exact=True)).to_be_disabled()
+    expect(page, "#taking").to_contain_text("hold one channel, or red, green and blue; this material has 31.")
     with page.expect_download() as download:
         page.get_by_role("button", name="albedo PNG").click()
     assert pathlib.Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
@@ -180,14 +196,33 @@ def test_a_dropped_file_is_asked_for_what_it_does_not_say(page: Any) -> None:
     expect(page, "#start").to_be_enabled()
 
 
+def test_a_table_without_a_header_is_asked_for_its_columns(page: Any, measured: pathlib.Path) -> None:
+    page.set_input_files("#file", measured / "satellite" / "chassis_brdf.csv")
+    expect(page, "#measurement-error").to_contain_text("chassis_brdf.csv: Expected the file to be of a known format")
+    expect(page, "#columns").to_be_focused()
+    page.fill("#columns", "phi_i,theta_i")
+    page.keyboard.press("Enter")
+    expect(page, "#measurement-error").to_contain_text("chassis_brdf.csv: Expected ")
+    page.fill("#columns", "theta_i,phi_i,theta_o,phi_o,value")
+    page.keyboard.press("Enter")
+    for answer in ("brdf", "degrees"):
+        page.check(f"#ask input[value={answer}]")
+        page.click("#ask button")
+    expect(page, "#about").to_contain_text("716")
+    expect(page, "#ask").to_be_hidden()
+    expect(page, "#measurement-error").to_be_hidden()
+
+
 def test_a_bad_file_and_a_bad_model_are_told_where_they_arose(page: Any, tmp_path: pathlib.Path) -> None:
     bad = tmp_path / "notes.txt"
     bad.write_text("hello\n")
     page.set_input_files("#file", bad)
     expect(page, "#measurement-error").to_contain_text("Expected the file to be of a known format")
+    expect(page, "#columns").to_be_visible()
     page.set_input_files("#file", DATA)
     expect(page, "#about").to_contain_text("222")
     expect(page, "#measurement-error").to_be_hidden()
+    expect(page, "#ask").to_be_hidden()
     only(page)
     expect(page, "#start").to_be_disabled()
     page.fill("#text", "lambert + wart")
@@ -239,6 +274,40 @@ def test_a_choice_by_the_data_and_files_for_other_programs(page: Any) -> None:
             page.get_by_role("button", name=name, exact=True).click()
         assert pathlib.Path(download.value.path()).read_text().startswith(begins)
         assert download.value.suggested_filename.startswith("fit_")
+
+
+def test_models_that_one_fit_compared_stand_side_by_side(page: Any) -> None:
+    page.click("#example")
+    expect(page, "#about").to_contain_text("222")
+    page.evaluate(
+        """async () => {
+          const headers = { "content-type": "application/json" };
+          const file = await (await fetch("/static/example.csv")).blob();
+          const { id } = await (await fetch("/v1/datasets", { method: "POST", body: file })).json();
+          const body = JSON.stringify({ dataset: id, models: ["lambert", "lambert + ward_bounded"] });
+          const fit = await (await fetch("/v1/fits", { method: "POST", headers, body })).json();
+          location.hash = `fit=${fit.id}`;
+        }"""
+    )
+    expect(page, "#ranking tbody tr").to_have_count(2)
+    expect(page, "#ranking tbody tr.chosen").to_contain_text("lambert + ward_bounded(isotropic)")
+    expect(page, "#spheres button").to_have_count(2)
+    expect(page, "#spheres [aria-pressed=true]").to_have_text("1. lambert + ward_bounded(isotropic)")
+    best = page.evaluate(BALL)
+    page.locator("#spheres button").nth(1).click()
+    expect(page, "#ranking tbody tr.chosen td >> nth=1").to_have_text("lambert")
+    expect(page, "#details h3 >> nth=0").to_have_text("Parameters of lambert")
+    expect(page, "#taking pre >> nth=0").to_contain_text('model="lambert")')
+    page.wait_for_function("(before) => document.getElementById('sphere').toDataURL() !== before", arg=best)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="json", exact=True).click()
+    assert "ward_bounded" not in pathlib.Path(download.value.path()).read_text()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="sphere PNG").click()
+    assert pathlib.Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
+    page.click("#again")
+    expect(page, "#ranking tbody tr").to_have_count(1)
+    assert page.evaluate(UNLABELLED) == []
 
 
 def test_a_service_with_a_key_asks_for_it(browser: Any, tmp_path: pathlib.Path) -> None:
@@ -298,3 +367,25 @@ def test_the_first_view_and_a_slider_are_quick(page: Any, url: str) -> None:
     print(f"first view {first:.0f} ms; from the slider to the redrawn lobe {median:.0f} ms, median of 21")
     assert first <= 2000
     assert median <= 150
+
+
+@pytest.mark.bench
+def test_a_million_samples_do_not_freeze_the_page(browser: Any, page: Any, url: str, tmp_path: pathlib.Path) -> None:
+    count, random = 1_000_000, np.random.default_rng(0)
+    angles = {name: random.uniform(0, 80, count) for name in ("theta_i", "theta_o")}
+    angles |= {"phi_i": np.zeros(count), "phi_o": random.uniform(0, 360, count)}
+    units = {"angle_unit": "degrees", "quantity": "brdf"}
+    np.savez(tmp_path / "million.npz", values=0.1 + 0.01 * random.normal(size=count), **angles, **units)
+    page.goto("about:blank")
+    browser.start_tracing(page=page, categories=["toplevel", "devtools.timeline"])
+    page.goto(url)
+    page.set_input_files("#file", tmp_path / "million.npz")
+    expect(page, "#about").to_contain_text("1,000,000")
+    expect(page, "#where-figure").to_be_visible()
+    only(page, "ward_bounded")
+    page.click("#start")
+    page.wait_for_selector("#residuals .main-svg", timeout=120_000)
+    page.wait_for_timeout(1000)
+    longest = longest_task(browser.stop_tracing())
+    print(f"a million samples read, fitted and drawn: the page's longest task takes {longest:.0f} ms of the processor")
+    assert 1 < longest <= 200
