@@ -51,7 +51,7 @@ class Datasets:
         finally:
             shutil.rmtree(folder, ignore_errors=True)  # after `add` has kept it there is nothing left to remove
 
-    def add(self, folder: Path, sha256: str, declared: dict[str, str | None]) -> tuple[DatasetView, bool]:
+    def add(self, folder: Path, sha256: str, declared: dict[str, Any]) -> tuple[DatasetView, bool]:
         """The dataset in `folder`/data, and whether it is new; raises what `brdfcore.read` does."""
         name = hashlib.sha256(f"{sha256} {json.dumps(declared, sort_keys=True)}".encode()).hexdigest()
         known = self.get(name)
@@ -113,7 +113,8 @@ class Datasets:
         dataset = self.get(name)
         if dataset is None:
             raise missing(name)
-        return read(self._kept / name / "data", **dataset.declared)
+        declared: dict[str, Any] = dict(dataset.declared)
+        return read(self._kept / name / "data", **declared)
 
 
 def missing(name: str) -> BrdfError:
