@@ -34,7 +34,7 @@ def command(
     """Write a measured file's samples, as the BRDF [1/sr], with sigma, weights and channels; say what was masked."""
     import brdfcore as bc
 
-    from .. import colour
+    from ..colour import told, wavelengths
     from ..errors import InvalidValueError
 
     writers = {found.suffix: found.write for found in bc.FORMATS.values() if found.suffix is not None}
@@ -54,8 +54,8 @@ def command(
     extras = f", with {' and '.join(kept)}" if kept else ""
     channels = f"in {len(samples.channels)} channel{'s' * (len(samples.channels) > 1)}"
     typer.echo(f"{out}: {len(samples):,} samples of the BRDF [1/sr] {channels}{extras}")
-    nm = colour.wavelengths(read.channels) if rgb else None
+    nm = wavelengths(read.channels) if rgb else None
     if nm is not None:
-        typer.echo(f"red, green and blue (linear sRGB under D65) of {colour.told(nm)}")
+        typer.echo(f"red, green and blue (linear sRGB under D65) of {told(nm)}")
     for masked in samples.masked:
         typer.echo(f"left out: {masked.count:,} where {masked.reason}")

@@ -18,7 +18,7 @@ from typing import Any, Final, TypedDict, Unpack
 import torch
 from torch import Tensor
 
-from .. import colour
+from ..colour import RGB, of_spectrum
 from ..errors import SamplesError, unknown_name
 from ._checks import Numbers, Where, as_numbers, default_where, per_channel, per_sample, require, unit_directions
 
@@ -228,11 +228,11 @@ class Samples:
         wavelengths do). sigma follows from independent errors. What sRGB does not hold is negative in a channel.
         Raises SamplesError where the channels are no spectrum by their names, or too little of one.
         """
-        if self.channels == colour.RGB:
+        if self.channels == RGB:
             return self
-        weights = colour.of_spectrum(self.channels)
+        weights = of_spectrum(self.channels)
         sigma = None if self.sigma is None else (self.sigma.square() @ weights.square()).sqrt()
-        return self._with({"values": self.values @ weights, "sigma": sigma, "channels": colour.RGB})
+        return self._with({"values": self.values @ weights, "sigma": sigma, "channels": RGB})
 
     def _with(self, changed: Mapping[str, Any]) -> "Samples":
         """The same samples but for these fields, which are right already."""
