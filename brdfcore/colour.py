@@ -79,9 +79,8 @@ def of_spectrum(channels: Sequence[str]) -> Tensor:
 
 def told(nm: Tensor) -> str:
     """The wavelengths in words: how many, from where to where, and how much of what the eye sees they span."""
-    return (
-        f"{len(nm)} wavelengths, {float(nm.min()):g} to {float(nm.max()):g} nm, {covered(nm):.1%} of what the eye sees"
-    )
+    ends = f"{float(nm.min()):g} to {float(nm.max()):g} nm" if len(nm) > 1 else f"{float(nm):g} nm"
+    return f"{len(nm)} wavelength{'s' * (len(nm) > 1)}, {ends}, {covered(nm):.1%} of what the eye sees"
 
 
 def _no_spectrum(rule: str, got: str) -> SamplesError:
