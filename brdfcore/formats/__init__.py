@@ -107,6 +107,13 @@ def detect(head: bytes) -> str:
         raise FormatError(
             f"Expected the file to be of one format, got {' and '.join(names)}. Pass format.", field="format"
         )
+    if curet.is_table(head):
+        raise FormatError(
+            f"Expected the file with CUReT's values, got {curet.TABLE}, which holds their directions alone. "
+            f"Read abrdf.dat with {curet.TABLE} beside it; "
+            "where only one can be sent, what `brdf convert` makes of them.",
+            field="path",
+        )
     raise FormatError(
         f"Expected the file to be of a known format, got {_beginning(head)} Known: {', '.join(FORMATS)}.",
         field="format",
