@@ -20,7 +20,7 @@ Read are the parametrisations that give both directions, of a view V and a light
 Vertical segments are bounds that ALTA's fitters keep within, not standard deviations: they are read past.
 Source: ALTA's page on data file formats and the notes in its params.h (Belcour and others, Inria). Departures: its code
 turns B round in STARK_3D and NEUMANN_3D against its own definition, which a reciprocal material cannot show.
-INV_STERADIAN_COSINE_FACTOR is defined by a note alone, and of another cosine than brdf_cos: the caller has to declare it.
+INV_STERADIAN_COSINE_FACTOR is defined by a note alone, of another cosine than brdf_cos: the caller has to declare it.
 Parametrisations whose definition and code disagree (SCHLICK_TL_TK_PROJ_DPHI, RETRO_TL_TVL_PROJ_DPHI, STEREOGRAPHIC) are
 refused, as are those that leave a direction open.
 """
