@@ -52,7 +52,7 @@ class Datasets:
         finally:
             shutil.rmtree(folder, ignore_errors=True)  # after `add` has kept it there is nothing left to remove
 
-    def add(self, folder: Path, sha256: str, declared: dict[str, str | None], most: int) -> tuple[DatasetView, bool]:
+    def add(self, folder: Path, sha256: str, declared: dict[str, Any], most: int) -> tuple[DatasetView, bool]:
         """The dataset in `folder`/data, of at most so many bytes unpacked, and whether it is new.
 
         Raises what `brdfcore.read` does.
@@ -118,7 +118,8 @@ class Datasets:
         dataset = self.get(name)
         if dataset is None:
             raise missing(name)
-        return read(self._kept / name / "data", **dataset.declared)
+        declared: dict[str, Any] = dict(dataset.declared)
+        return read(self._kept / name / "data", **declared)
 
 
 def missing(name: str) -> BrdfError:

@@ -19,6 +19,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # The house, ground floor first; a part imports from parts above it in this list, or from itself.
 FLOORS = [
     ["errors", "_types"],
+    ["colour"],
     ["geometry"],
     ["parameters"],
     ["models"],

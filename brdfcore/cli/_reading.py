@@ -23,6 +23,9 @@ ColumnsOption: TypeAlias = Annotated[
         help="Names of a table's columns, as theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value, if it lacks them."
     ),
 ]
+RgbOption: TypeAlias = Annotated[
+    bool, typer.Option("--rgb", help="Turn a spectrum into red, green and blue, which renderers take.")
+]
 MaterialOption: TypeAlias = Annotated[
     str | None, typer.Option("--material", help="Which one, where a file holds several (CUReT: 1 to 61).")
 ]

@@ -6,7 +6,15 @@ from typing import Annotated
 
 import typer
 
-from ._reading import AngleUnitOption, ColumnsOption, FileArgument, FormatOption, MaterialOption, QuantityOption
+from ._reading import (
+    AngleUnitOption,
+    ColumnsOption,
+    FileArgument,
+    FormatOption,
+    MaterialOption,
+    QuantityOption,
+    RgbOption,
+)
 from .fit import _pair, _with_bar
 
 
@@ -26,6 +34,7 @@ def command(
     angle_unit: AngleUnitOption = None,
     columns: ColumnsOption = None,
     which: MaterialOption = None,
+    rgb: RgbOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, with each model's fit.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw the errors to this .svg or .png file.")] = None,
 ) -> None:
@@ -37,7 +46,8 @@ def command(
     check_losses(losses or ())
     if plot is not None:  # what cannot be drawn is refused before the work, not after it
         bc.plots.kind_of(plot)
-    samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit, columns=columns, material=which)
+    declared = {"format": format_, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
+    samples = bc.read(file, **declared, material=which, rgb=rgb)
     result = _with_bar(
         lambda progress: bc.compare(
             samples,

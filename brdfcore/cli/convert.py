@@ -5,7 +5,15 @@ from typing import Annotated
 
 import typer
 
-from ._reading import AngleUnitOption, ColumnsOption, FileArgument, FormatOption, MaterialOption, QuantityOption
+from ._reading import (
+    AngleUnitOption,
+    ColumnsOption,
+    FileArgument,
+    FormatOption,
+    MaterialOption,
+    QuantityOption,
+    RgbOption,
+)
 
 
 def command(
@@ -21,10 +29,12 @@ def command(
     angle_unit: AngleUnitOption = None,
     columns: ColumnsOption = None,
     which: MaterialOption = None,
+    rgb: RgbOption = False,
 ) -> None:
     """Write a measured file's samples, as the BRDF [1/sr], with sigma, weights and channels; say what was masked."""
     import brdfcore as bc
 
+    from ..colour import told, wavelengths
     from ..errors import InvalidValueError
 
     writers = {found.suffix: found.write for found in bc.FORMATS.values() if found.suffix is not None}
@@ -37,11 +47,15 @@ def command(
         raise InvalidValueError(
             f"Expected OUT to be another file than FILE, got {str(out)!r} for both. Rename it.", field="out"
         )
-    samples = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit, columns=columns, material=which)
+    read = bc.read(file, format=format_, quantity=quantity, angle_unit=angle_unit, columns=columns, material=which)
+    samples = read.to_rgb() if rgb else read
     write(samples, out)
     kept = [name for name in ("sigma", "weight", "cell") if getattr(samples, name) is not None]
     extras = f", with {' and '.join(kept)}" if kept else ""
     channels = f"in {len(samples.channels)} channel{'s' * (len(samples.channels) > 1)}"
     typer.echo(f"{out}: {len(samples):,} samples of the BRDF [1/sr] {channels}{extras}")
+    nm = wavelengths(read.channels) if rgb else None
+    if nm is not None:
+        typer.echo(f"red, green and blue (linear sRGB under D65) of {told(nm)}")
     for masked in samples.masked:
         typer.echo(f"left out: {masked.count:,} where {masked.reason}")

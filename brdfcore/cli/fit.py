@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from ._reading import AngleUnitOption, ColumnsOption, FileArgument, FormatOption, MaterialOption, QuantityOption
+from ._reading import (
+    AngleUnitOption,
+    ColumnsOption,
+    FileArgument,
+    FormatOption,
+    MaterialOption,
+    QuantityOption,
+    RgbOption,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,6 +48,7 @@ def command(
     angle_unit: AngleUnitOption = None,
     columns: ColumnsOption = None,
     which: MaterialOption = None,
+    rgb: RgbOption = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Write the lobe plot to this .svg or .png file.")] = None,
     residuals: Annotated[Path | None, typer.Option(help="Write the residuals by angle to this .svg or .png.")] = None,
@@ -62,7 +71,8 @@ def command(
         "robust_scale": robust_scale,
         "conserve_energy": conserve_energy,
     }
-    declared = {"format": format_, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
+    declared: dict[str, Any] = {"format": format_, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
+    declared["rgb"] = rgb
     if server is not None:
         if which is not None:
             from ..errors import InvalidValueError

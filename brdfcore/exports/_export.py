@@ -89,6 +89,7 @@ def check_channels(count: int) -> None:
     if count not in (1, 3):
         raise InvalidValueError(
             f"Expected the material to have one channel or three, red, green and blue, got {count}. "
-            "Fit it to three channels, or export it as json.",
+            "Fit its spectrum as red, green and blue (brdf fit --rgb, bc.read(..., rgb=True), "
+            "POST /v1/datasets?rgb=true), or export it as json.",
             field="material",
         )

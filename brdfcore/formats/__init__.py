@@ -35,6 +35,7 @@ def read(
     *,
     columns: str | Sequence[str] | None = None,
     material: int | str | None = None,
+    rgb: bool = False,
 ) -> Samples:
     """The samples of a measured file, values in 1/sr; its format is told by its content, never by its extension.
 
@@ -44,6 +45,7 @@ def read(
     columns     the names of a table's columns as a header row has them, a list or separated by commas, where the file
                 has none or other names
     material    which one, where a file holds several
+    rgb         a spectrum as red, green and blue, as renderers take them (Samples.to_rgb)
 
     Raises FormatError (unreadable, unknown, damaged, or something is undeclared), SamplesError (a row is no
     reflectance measurement) or UnknownNameError; the message is one sentence with what to do.
@@ -67,7 +69,8 @@ def read(
                     f"got {str(value)[:40]!r}. Drop the argument.",
                     field=field,
                 )
-        return found.read(file, quantity, angle_unit, **given)
+        samples = found.read(file, quantity, angle_unit, **given)
+        return samples.to_rgb() if rgb else samples
     except OSError as error:
         raise FormatError(
             f"Expected path to be a readable file, got {file.name!r} ({error.strerror}). Check the path.", field="path"
@@ -103,6 +106,13 @@ def detect(head: bytes) -> str:
     if names:
         raise FormatError(
             f"Expected the file to be of one format, got {' and '.join(names)}. Pass format.", field="format"
+        )
+    if curet.is_table(head):
+        raise FormatError(
+            f"Expected the file with CUReT's values, got {curet.TABLE}, which holds their directions alone. "
+            f"Read abrdf.dat with {curet.TABLE} beside it; "
+            "where only one can be sent, what `brdf convert` makes of them.",
+            field="path",
         )
     raise FormatError(
         f"Expected the file to be of a known format, got {_beginning(head)} Known: {', '.join(FORMATS)}.",

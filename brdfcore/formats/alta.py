@@ -20,6 +20,7 @@ Read are the parametrisations that give both directions, of a view V and a light
 Vertical segments are bounds that ALTA's fitters keep within, not standard deviations: they are read past.
 Source: ALTA's page on data file formats and the notes in its params.h (Belcour and others, Inria). Departures: its code
 turns B round in STARK_3D and NEUMANN_3D against its own definition, which a reciprocal material cannot show.
+INV_STERADIAN_COSINE_FACTOR is defined by a note alone, of another cosine than brdf_cos: the caller has to declare it.
 Parametrisations whose definition and code disagree (SCHLICK_TL_TK_PROJ_DPHI, RETRO_TL_TVL_PROJ_DPHI, STEREOGRAPHIC) are
 refused, as are those that leave a direction open.
 """
@@ -47,6 +48,10 @@ _DIM = re.compile(rb"^#DIM[ \t]+\d+[ \t]+\d+[ \t\r]*$", re.MULTILINE)
 _BINARY = re.compile(rb"^#FORMAT[ \t]+binary\b", re.MULTILINE)
 _HEADER = 65_536  # bytes within which the header says so
 _QUANTITY = {"INV_STERADIAN": "brdf"}
+_WEIGHTED = (
+    "by ALTA's notes the BRDF times the outgoing direction's cosine, which nothing in ALTA computes: "
+    "if the cosine is the light's, pass quantity='brdf_cos'; else divide by it and write INV_STERADIAN."
+)
 _CHANNELS = {"RGB_COLOR": ("r", "g", "b"), "XYZ_COLOR": ("x", "y", "z")}
 _MOST = 1000  # numbers in a row, beyond which the header is damaged
 
@@ -146,7 +151,8 @@ def read(path: Path, quantity: str | None, angle_unit: str | None) -> Samples:
             f"Expected DIM to begin with {given}, as {name} takes, got {dimensions}. Correct the header.", field="DIM"
         )
     out = keys.get("PARAM_OUT", "nothing")
-    how = f"PARAM_OUT is {brief(out)[1:-1]}, which does not say it: pass quantity."
+    how = _WEIGHTED if out == "INV_STERADIAN_COSINE_FACTOR" else "which does not say it: pass quantity."
+    how = f"PARAM_OUT is {brief(out)[1:-1]}, {how}"
     measured_quantity = declared("quantity", QUANTITIES, _QUANTITY.get(out), quantity, how)
     channels = _CHANNELS.get(out) if _CHANNELS.get(out) is not None and count == 3 else None
     segments = _segments(keys.get("VS", ""), count)

@@ -38,6 +38,13 @@ def sniff(head: bytes) -> bool:
     return len(words) == 1 + GEOMETRIES and words[0].isdecimal() and None not in numbers and "." in words[1]
 
 
+def is_table(head: bytes) -> bool:
+    """Whether the file is the table of the directions, which holds no values."""
+    rows = [line.split() for line in (head_text(head) or "").split("\n") if line.strip()]
+    counted = [row[0] for row in rows] == [str(k + 1) for k in range(GEOMETRIES)]
+    return counted and all(len(row) == len(_NAMES) for row in rows)
+
+
 def read(path: Path, quantity: str | None, angle_unit: str | None, material: int | str | None = None) -> Samples:
     """The samples of one material of a CUReT file, values in 1/sr; FormatError names the file and line at fault."""
     declared("quantity", QUANTITIES, "brdf", quantity, "")

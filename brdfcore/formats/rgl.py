@@ -15,9 +15,9 @@ Source: Dupuy and Jakob 2018, "An adaptive parameterization for efficient materi
 Transactions on Graphics 37(6), and the authors' brdf-loader. Departure: double precision.
 """
 
+import dataclasses
 import itertools
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..colour import RGB, of_spectrum
 from ..errors import FormatError
 from ._declared import declared
 from ._format import Format
@@ -40,7 +41,7 @@ _BELOW = "a direction at the grid's node is at or below the horizon"
 _FIELDS = {"phi_i": 1, "theta_i": 1, "ndf": 2, "sigma": 2, "vndf": 4, "luminance": 4, "jacobian": 1}
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Rgl:
     """The tables of a file; directions are arrays (N, 3)."""
 
@@ -53,6 +54,13 @@ class Rgl:
     values: Array  # (P T, C, h, w)
     channels: tuple[str, ...]
     jacobian: bool
+
+    def to_rgb(self) -> "Rgl":
+        """The tables in linear sRGB, as Samples.to_rgb has it: f is linear in the values."""
+        if self.channels == RGB:
+            return self
+        weights = of_spectrum(self.channels).numpy()
+        return dataclasses.replace(self, values=np.einsum("ichw,cd->idhw", self.values, weights), channels=RGB)
 
     @property
     def isotropic(self) -> bool:

@@ -10,7 +10,7 @@ What was measured is declared and converted once, when the samples are made:
 import hashlib
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final, TypedDict, Unpack
@@ -18,6 +18,7 @@ from typing import Any, Final, TypedDict, Unpack
 import torch
 from torch import Tensor
 
+from ..colour import RGB, of_spectrum
 from ..errors import SamplesError, unknown_name
 from ._checks import Numbers, Where, as_numbers, default_where, per_channel, per_sample, require, unit_directions
 
@@ -217,11 +218,28 @@ class Samples:
                 "Pick rows that exist.",
                 field="index",
             )
-        picked = object.__new__(Samples)
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return self._with({name: value[rows] for name, value in fields.items() if isinstance(value, Tensor)})
+
+    def to_rgb(self) -> "Samples":
+        """The samples in linear sRGB, channels r, g and b; as they are where these are the channels already.
+
+        What the CIE 1931 observer sees of the spectrum under D65, a white being (1, 1, 1) (colour.py, also for what
+        wavelengths do). sigma follows from independent errors. What sRGB does not hold is negative in a channel.
+        Raises SamplesError where the channels are no spectrum by their names, or too little of one.
+        """
+        if self.channels == RGB:
+            return self
+        weights = of_spectrum(self.channels)
+        sigma = None if self.sigma is None else (self.sigma.square() @ weights.square()).sqrt()
+        return self._with({"values": self.values @ weights, "sigma": sigma, "channels": RGB})
+
+    def _with(self, changed: Mapping[str, Any]) -> "Samples":
+        """The same samples but for these fields, which are right already."""
+        made = object.__new__(Samples)
         for name in self.__dataclass_fields__:
-            value = getattr(self, name)
-            object.__setattr__(picked, name, value[rows] if isinstance(value, Tensor) else value)
-        return picked
+            object.__setattr__(made, name, changed[name] if name in changed else getattr(self, name))
+        return made
 
     def __len__(self) -> int:
         return len(self.wi)

@@ -38,8 +38,11 @@ class Tabulated:
         self.path = path  # of the file that it was read from
 
     @classmethod
-    def read(cls, path: str | PathLike[str]) -> "Tabulated":
-        """The material of a MERL or RGL file; FormatError where it is none, or not whole."""
+    def read(cls, path: str | PathLike[str], *, rgb: bool = False) -> "Tabulated":
+        """The material of a MERL or RGL file; FormatError where it is none, or not whole.
+
+        rgb turns a spectrum into linear sRGB, as Samples.to_rgb does; SamplesError where it has no colour.
+        """
         file = Path(path)
         try:
             with file.open("rb") as opened:
@@ -49,7 +52,8 @@ class Tabulated:
                     f"Expected a file that is a grid ({' or '.join(GRIDDED)}), got {name}. Fit it with bc.fit.",
                     field="path",
                 )
-            return cls(GRIDDED[name](file), file.name, file)
+            grid = GRIDDED[name](file)
+            return cls(grid.to_rgb() if rgb and isinstance(grid, rgl.Rgl) else grid, file.name, file)
         except OSError as error:
             raise FormatError(
                 f"Expected path to be a readable file, got {file.name!r} ({error.strerror}). Check the path.",

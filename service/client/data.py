@@ -20,6 +20,8 @@ def placed(data: Any, declared: Mapping[str, Any]) -> Call[dict[str, Any]]:
     if isinstance(data, str | os.PathLike):
         dataset = yield from uploaded(data, declared)
         return {"dataset": dataset.id}
+    if declared.get("rgb"):
+        raise ClientError("Expected rgb to go with a file, got samples. Pass what their to_rgb() returns, without rgb.")
     columns = _columns(data, declared.get("quantity"))
     if len(columns["values"]) <= INLINE_ROWS:
         return {"samples": columns}

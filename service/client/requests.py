@@ -42,6 +42,7 @@ class Declared(TypedDict, total=False):
     quantity: str | None
     angle_unit: str | None
     columns: str | None
+    rgb: bool
 
 
 class FitOptions(Declared, total=False):

@@ -32,6 +32,7 @@ class Declarations(BaseModel):
     columns: str | None = Field(
         None, max_length=2000, description="names of a table's columns, separated by commas, where it lacks them"
     )
+    rgb: bool = Field(False, description="turns a spectrum into red, green and blue, which renderers take")
 
 
 @router.post(
@@ -51,7 +52,8 @@ async def upload(request: Request, response: Response, declared: Annotated[Decla
             async for piece in chunks(request, service.settings.upload_limit):
                 digest.update(piece)
                 file.write(piece)
-        arguments = folder, digest.hexdigest(), declared.model_dump(), service.settings.upload_limit
+        said = declared.model_dump(exclude=None if declared.rgb else {"rgb"})  # so that ids stay what they were without
+        arguments = folder, digest.hexdigest(), said, service.settings.upload_limit
         try:
             dataset, new = await asyncio.get_running_loop().run_in_executor(
                 service.aside, service.datasets.add, *arguments

@@ -37,8 +37,8 @@ class DatasetView(View):
     id: str
     bytes: int
     sha256: str
-    declared: dict[str, str | None] = Field(
-        description="format, quantity, angle_unit and columns as the upload declared them"
+    declared: dict[str, str | bool | None] = Field(
+        description="format, quantity, angle_unit, columns and rgb as the upload declared them"
     )
     created: datetime
     report: dict[str, Any] = Field(description="what the samples are, what was masked and why")

@@ -67,6 +67,7 @@ async function take(file, declared = {}, remark = "") {
     const dataset = await get(`/v1/datasets?${query}`, { method: "POST", body: file, headers });
     at("measurement-said").textContent = `${file.name} was read${remark && `: ${remark}`}.`;
     await show(dataset);
+    offerColour(file, declared, dataset.report.channels);
   } catch (error) {
     at("measurement-said").textContent = "";
     const field = error instanceof Refusal ? (error.field === "format" ? COLUMNS : error.field) : null;
@@ -126,6 +127,26 @@ function inShort(error) {
 }
 
 /**
+ * Of a file whose channels are wavelengths, offer the colour that the eye sees.
+ * @param {File} file
+ * @param {Record<string, string>} declared
+ * @param {string[]} channels
+ */
+function offerColour(file, declared, channels) {
+  if (channels.length <= 3 || !channels.every((name) => /^\d{3,}(\.\d+)?\s*(nm)?$/.test(name))) return;
+  const form = at("ask");
+  form.replaceChildren(
+    made("p", { class: "hint" }, "The channels are wavelengths. Renderers take three colours: "),
+    made("button", { type: "submit" }, "Read as red, green and blue"),
+  );
+  form.onsubmit = (/** @type {SubmitEvent} */ event) => {
+    event.preventDefault();
+    take(file, { ...declared, rgb: "true" }, "its spectrum as red, green and blue under daylight (linear sRGB, D65)");
+  };
+  form.hidden = false;
+}
+
+/**
  * Make a dataset the page's, with the samples that are drawn.
  * @param {import("./state.js").Dataset} dataset
  */
@@ -140,6 +161,7 @@ export async function show(dataset) {
 
 function describe() {
   const about = at("about");
+  at("ask").hidden = true;
   if (state.dataset === null) return about.replaceChildren();
   const { report, bytes } = state.dataset;
   const range = (/** @type {number[]} */ [low, high]) => (low === high ? `${shown(low)}°` : `${shown(low)}° to ${shown(high)}°`);

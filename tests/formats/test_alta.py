@@ -113,6 +113,10 @@ def test_colours_and_other_outputs_have_to_be_declared(write: Write) -> None:
     assert caught.value.field == "quantity"
     samples = read(write(text), quantity="brdf")
     assert samples.channels == ("r", "g", "b")
+    weighted = ALTA.replace("INV_STERADIAN", "INV_STERADIAN_COSINE_FACTOR")
+    with pytest.raises(FormatError, match=r"the outgoing direction's cosine, .* the light's, pass quantity='brdf_cos'"):
+        read(write(weighted))
+    assert read(write(weighted), quantity="brdf_cos").values[1].item() == pytest.approx(0.25 / 0.8)
     assert samples.values.tolist() == [[1.0, 2.0, 3.0]]
     with pytest.raises(FormatError, match="quantity to be 'brdf' as the file has it, got 'brdf_cos'"):
         read(write(ALTA), quantity="brdf_cos")

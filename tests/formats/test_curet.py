@@ -45,6 +45,15 @@ def test_the_table_has_to_lie_beside(files: tuple[Path, Path]) -> None:
         read(files[0], material=1)
 
 
+def test_who_gives_the_table_is_told_which_file_to_give(files: tuple[Path, Path]) -> None:
+    told = r"Expected the file with CUReT's values, got table\.txt, .* Read abrdf\.dat with table\.txt beside it;"
+    with pytest.raises(FormatError, match=told):
+        read(files[1])
+    files[1].write_text(files[1].read_text().replace("205 ", "204 "))
+    with pytest.raises(FormatError, match="pass columns"):
+        read(files[1])
+
+
 @pytest.mark.parametrize(
     ("index", "change", "words"),
     [

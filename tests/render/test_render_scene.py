@@ -112,7 +112,12 @@ BAD = {
     "a place that is no number": ("camera/position", [float("nan"), 0, 1], "camera.position", "three finite numbers"),
     "a size beyond arithmetic": ("objects/0/radius", 1e200, "objects[0].radius", "up to 1e30, got 1e+200"),
     "a size that is no number": ("objects/0/radius", float("nan"), "objects[0].radius", "up to 1e30, got nan"),
-    "a light that is no number": ("lights/0/radiance", float("nan"), "lights[0].radiance", "not negative and up to 1e30, got nan"),
+    "a light that is no number": (
+        "lights/0/radiance",
+        float("nan"),
+        "lights[0].radiance",
+        "not negative and up to 1e30, got nan",
+    ),
     "a reflectance that is no number": ("objects/0/material", "lambert(kd=nan)", "objects[0].material", "kd"),
     "camera looks nowhere": ("camera/look_at", [3, 0, 1], "camera.look_at", "to differ from position"),
     "camera looks up": ("camera/look_at", [3, 0, 2], "camera.look_at", "and not along up"),

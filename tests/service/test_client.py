@@ -192,6 +192,17 @@ def test_formats_are_listed_and_a_table_is_named(client: Client, tmp_path: pathl
     assert fit.parameters["lambert.kd"] == pytest.approx(0.2 * math.pi)
 
 
+def test_a_spectrum_travels_as_a_file(client: Client, tmp_path: pathlib.Path) -> None:
+    nm = [str(nm) for nm in range(400, 701, 30)]
+    samples = as_samples()
+    spectrum = bc.Samples(samples.wi, samples.wo, samples.values.expand(-1, len(nm)), nm)
+    bc.FORMATS["npz"].write(spectrum, tmp_path / "spectrum.npz")  # type: ignore[misc]
+    assert client.upload(tmp_path / "spectrum.npz", rgb=True).report["channels"] == ["r", "g", "b"]
+    assert len(client.fit(tmp_path / "spectrum.npz", model="lambert", rgb=True).parameters["lambert.kd"]) == 3
+    with pytest.raises(ClientError, match=r"rgb to go with a file, got samples\. Pass what their to_rgb\(\) returns"):
+        client.fit(spectrum, model="lambert", rgb=True)
+
+
 def test_models_are_listed(client: Client) -> None:
     assert [model.name for model in client.models()] == list(bc.MODELS)
 

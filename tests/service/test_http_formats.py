@@ -58,6 +58,25 @@ def test_text_formats_can_be_uploaded(content: str, declared: dict[str, str], na
     assert fit.status_code == 202
 
 
+def test_a_spectrum_is_uploaded_as_red_green_and_blue(http: TestClient) -> None:
+    names = [str(nm) for nm in range(400, 701, 20)]
+    head = "# quantity: brdf\n" + ",".join(["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg", *names])
+    content = f"{head}\n10,0,20,180{',0.2' * 16}\n20,0,20,180{',0.1' * 16}\n".encode()
+    spectral, rgb = (http.post("/v1/datasets", content=content, params=asked).json() for asked in ({}, {"rgb": True}))
+    assert (spectral["report"]["channels"], "rgb" in spectral["declared"]) == (names, False)
+    assert (rgb["report"]["channels"], rgb["declared"]["rgb"]) == (["r", "g", "b"], True)
+    assert rgb["id"] != spectral["id"]
+    assert http.get(f"/v1/datasets/{rgb['id']}/samples").json()["values"][0] == pytest.approx([0.2, 0.2, 0.2])
+    again = http.post("/v1/datasets", content=content, params={"rgb": "false"})
+    assert (again.status_code, again.json()["id"]) == (200, spectral["id"])
+    body = {"dataset": rgb["id"], "model": "lambert"}
+    fit = http.post("/v1/fits", json=body, headers={"prefer": "wait=30"}).json()
+    assert len(fit["result"]["parameters"]["lambert.kd"]) == 3
+    refused = http.post("/v1/datasets", content=NIST.encode(), params={"rgb": True})
+    assert (refused.status_code, refused.json()["field"]) == (422, "rgb")
+    assert "got 1 wavelength, 500 nm, 0.0% of what the eye sees." in refused.json()["detail"]
+
+
 def test_half_of_two_files_is_refused_with_the_way_out(http: TestClient) -> None:
     row = "1 " + " ".join(["0.100"] * 205) + "\n"
     answer = http.post("/v1/datasets", content=row.encode())

@@ -176,6 +176,21 @@ def test_a_measurement_of_many_channels_from_file_to_figure(page: Any, measured:
     assert pathlib.Path(download.value.path()).read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_spectrum_is_offered_as_red_green_and_blue(page: Any) -> None:
+    names = ",".join(str(nm) for nm in range(400, 701, 20))
+    rows = "".join(f"{theta},0,20,180{',0.2' * 16}\n" for theta in range(10, 60, 5))
+    content = f"# quantity: brdf\ntheta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,{names}\n{rows}".encode()
+    page.set_input_files("#file", {"name": "paint.csv", "mimeType": "text/csv", "buffer": content})
+    expect(page, "#about").to_contain_text("16, 400 to 700")
+    expect(page, "#ask").to_contain_text("The channels are wavelengths.")
+    assert page.evaluate(UNLABELLED) == []
+    assert page.evaluate(LOW_CONTRASTS) == []
+    page.click("#ask button")
+    expect(page, "#about").to_contain_text("r, g, b")
+    expect(page, "#measurement-said").to_contain_text("paint.csv was read: its spectrum as red, green and blue")
+    expect(page, "#ask").to_be_hidden()
+
+
 def test_a_dropped_file_is_asked_for_what_it_does_not_say(page: Any) -> None:
     page.evaluate(
         """(text) => {
