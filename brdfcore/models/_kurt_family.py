@@ -39,3 +39,7 @@ class KurtFamily(FresnelLobe, GaussianSlopes):
         limit = 2.0**-20 * largest / lobe.detach()
         beyond = (lobe.detach() * over.detach()).clamp(max=largest)
         return torch.where(over < limit, lobe * torch.minimum(over, limit), beyond)
+
+    def log_slopes(self, values: Values, g: Geometry) -> dict[str, Tensor]:
+        """Those by the widths, which nothing but D reads."""
+        return self.width_slopes(values, g)
