@@ -64,10 +64,14 @@ class Data:
 
     def chunks(self, starts: int) -> Iterator["Data"]:
         """The data in pieces small enough for so many starts at once."""
+        return (piece for _, piece in self.places(starts))
+
+    def places(self, starts: int) -> Iterator[tuple[int, "Data"]]:
+        """Those pieces, each with the number of its first sample."""
         count = len(self.c)
         step = max(1, _CHUNK // max(1, starts))
         for begin in range(0, count, step):
-            yield self.slice(begin, min(begin + step, count)) if step < count else self
+            yield begin, self.slice(begin, min(begin + step, count)) if step < count else self
 
 
 def _alike(several: Sequence[Tensor]) -> Tensor:
