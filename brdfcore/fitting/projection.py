@@ -133,7 +133,7 @@ class Projection:
 
     @functools.cached_property
     def _weighed(self) -> tuple[Tensor, Tensor, Tensor]:
-        """What multiplies f - y in the residuals, (M, C, N) or broadcasting to it; that times y; its sums of squares."""
+        """What multiplies f - y in the residuals, (M, C, N) or broadcasting; that times y; its sums of squares."""
         data = self.problem.data
         factor = linear_factor(self.problem.loss_kind, data)
         y = factor * data.y

@@ -31,6 +31,7 @@ _MANY_STARTS = 16  # the same of two lobes and more, whose optima are many
 _DESCENTS = 2  # starts of Adam and LBFGS, which run one after the other
 _POLISH = 300  # their steps on all the data, after the subset
 _NONLINEAR = 6  # starts of a lone lobe under a loss that is not linear in f, whose steps move every reflectance
+_HOPELESS = 2.0  # times the best point's loss, from where a lone lobe's other points lead nowhere else
 _RACE_ALL = 1e-6  # of the loss, the same as the next where reflectances move too
 _RACE = 1e-4  # of the loss: what another step would gain once a start's end is clear
 
@@ -130,7 +131,7 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     linear = projection.problem is coarse
     few_starts = _STARTS if len(projection.shapes) > 1 else _STARTS // 2
     count = _MANY_STARTS if several_lobes(projection) else few_starts
-    starts = scan(coarse, projection, count, seed)
+    starts, shares = scan(coarse, projection, count, seed)
     each = starts.shape[1]
     which = torch.arange(materials).repeat_interleave(each)
     x = starts.reshape(-1, whole.size)
@@ -138,6 +139,9 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     iterations = 0
     projected = optimizer == "auto" and projection.useful and bool(projection.shapes)
     if projected:
+        if linear and not several_lobes(projection):
+            hopeful = shares.reshape(-1) <= _HOPELESS
+            x, which = x[hopeful], which[hopeful]
         raced = variable_projection(projection, x, which, _RACE, on_step=tell)
         iterations += raced.iterations
         if linear:
@@ -149,7 +153,7 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     if not (projected and linear):
         outcome = least_squares(coarse, x, which, _RACE_ALL, on_step=tell)
         iterations += outcome.iterations
-    best = outcome.pick(_best(outcome.loss, materials))
+    best = outcome.pick(_best(outcome.loss, which, materials))
     name = "variable_projection" if projected and linear else "least_squares"
     rows = torch.arange(materials)
     tell = _tell(say, 0.5, 0.9)
@@ -174,16 +178,17 @@ def _lowest(problem: Problem, x: Tensor, count: int) -> tuple[Tensor, Tensor]:
     return x[chosen.reshape(-1)], torch.arange(problem.materials).repeat_interleave(count)
 
 
-def _best(loss: Tensor, materials: int) -> Tensor:
-    """The row of each material whose loss is lowest, (M,)."""
-    by_material = torch.where(loss.isfinite(), loss, torch.inf).reshape(materials, -1)
-    return by_material.argmin(1) + by_material.shape[1] * torch.arange(materials)
+def _best(loss: Tensor, which: Tensor, materials: int) -> Tensor:
+    """The row of each material, named by `which` (S,), whose loss (S,) is lowest, (M,)."""
+    own = which == torch.arange(materials).unsqueeze(-1)
+    loss = loss.nan_to_num(nan=torch.inf).clamp(max=torch.finfo(loss.dtype).max)  # its own, even where none is finite
+    return torch.where(own, loss, torch.inf).argmin(1)
 
 
 def _descents(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: str, seed: int, say: Say) -> Found:
     """Adam or LBFGS from a few starts one after the other, then from the best on all the data."""
     run = {"adam": adam, "lbfgs": lbfgs}[optimizer]
-    starts = scan(coarse, _kindred(coarse, few), _DESCENTS, seed)
+    starts, _ = scan(coarse, _kindred(coarse, few), _DESCENTS, seed)
     ends: list[Outcome] = []
     share = 0.9 / starts[..., 0].numel()
     for material in range(whole.materials):

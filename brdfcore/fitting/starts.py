@@ -19,23 +19,36 @@ _BEYOND = 0.25  # of the points: so many more over the whole box, since a width 
 _AT_ONCE = 64  # points: the products of that many stay small
 
 
-def scan(problem: Problem, projection: Projection, count: int, seed: int) -> Tensor:
-    """Raw vectors (M, S, D) to start from: the user's, then up to twice `count` of a seeded scan's best."""
+def scan(problem: Problem, projection: Projection, count: int, seed: int) -> tuple[Tensor, Tensor]:
+    """Raw vectors (M, S, D) to start from: the user's, then up to twice `count` of a seeded scan's best.
+
+    With each comes its loss over that of the best of its kind, (M, S), which for the user's counts as 1.
+    """
     materials = problem.materials
     own = [problem.pack(values) for values in problem.plan.starts]
     given = torch.stack(own) if own else torch.zeros(0, problem.size, dtype=torch.float64)
     points = _points(problem, projection, seed)
     solved = points.expand(materials, -1, -1)
     best: list[Tensor] = []
+    shares = [torch.ones(materials, len(given), dtype=torch.float64)]
     if projection.useful:
         solved, loss = _solved(projection, points)
         best.append(loss.argsort(dim=1)[:, :count])
+        shares.append(_shares(loss.gather(1, best[-1])))
     if not projection.useful or projection.problem is not problem:
         which = torch.arange(materials).repeat_interleave(solved.shape[1])
         loss = problem.loss(solved.reshape(-1, problem.size), which).reshape(materials, -1)
         best.append(torch.where(loss.isfinite(), loss, torch.inf).argsort(dim=1)[:, :count])
+        shares.append(_shares(loss.gather(1, best[-1])))
     index = torch.cat(best, dim=1).unsqueeze(-1).expand(-1, -1, problem.size)
-    return torch.cat([given.expand(materials, -1, -1), solved.gather(1, index)], dim=1)
+    starts = torch.cat([given.expand(materials, -1, -1), solved.gather(1, index)], dim=1)
+    return starts, torch.cat(shares, dim=1)
+
+
+def _shares(loss: Tensor) -> Tensor:
+    """Losses (M, S), rising, over the first of each row; 1 where that is no positive number."""
+    first = loss[:, :1]
+    return torch.where(first > 0, loss / first.clamp(min=1e-300), 1.0).nan_to_num(1.0)
 
 
 def several_lobes(projection: Projection) -> bool:

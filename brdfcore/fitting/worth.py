@@ -34,7 +34,9 @@ def fits(
     if problem.data.sigma is not None:
         chi_square = ((f - problem.data.y) / problem.data.sigma).square().sum((1, 2)).tolist()
     freedom, minima, ends = known.freedom.tolist(), outcome.loss.tolist(), outcome.converged.tolist()
-    support = supports(fitted[0])
+    typical = torch.as_tensor(problem.data.scales.y, dtype=torch.float64).reshape(-1)
+    told = warnings(plan, supports(fitted[0]), problem.data.y, typical, problem.loss_kind.name)
+    names = [name_of(problem, at, channels) for at in range(problem.size)]
     found = []
     for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
         error = every_error[row]
@@ -54,13 +56,13 @@ def fits(
                 combinations=combinations,
                 singular_values=known.singular_values[row],
                 covariance=known.covariance[row][certain][:, certain],
-                covariance_keys=tuple(name_of(problem, at, channels) for at in certain.nonzero()[:, 0].tolist()),
+                covariance_keys=tuple(names[at] for at in certain.nonzero()[:, 0].tolist()),
                 errors=error,
                 loss=problem.loss_kind.name,
                 objective=minima[row] if weighed or plan.robust else error[problem.loss_kind.name],
                 status=("undetermined" if undetermined else "converged") if ends[row] else "stopped_early",
                 message=_message(problem, known, row, undetermined, converged=ends[row], weighed=weighed),
-                warnings=warnings(plan, support, samples, problem.loss_kind.name),
+                warnings=told[row],
                 choices=plan.choices,
                 fixed=tuple(sorted(plan.fixed)),
                 gray=tuple(sorted(plan.gray)),
@@ -160,7 +162,8 @@ def _message(
             f"The data do not determine {', nor '.join(together)} one by one, only together; no number is given for "
             "any of them. Fix one of them, or measure where their effects differ."
         )
-    vague = [key for key, at in problem.slices.items() if bool(known.vague[row, at].any())]
+    short = known.vague[row].tolist()
+    vague = [key for key, at in problem.slices.items() if any(short[at])]
     if vague:
         parts.append(
             f"Few samples decide {', '.join(vague)}, so an interval there is as long as the range that is searched."
