@@ -198,6 +198,8 @@ def named(
     says in how many. Channels that share a kind of combination are named once. A change is in the parameter's own unit,
     and a combination's have length 1; `chain` (D,) makes them of the raw ones.
     """
+    if not len(found.directions):
+        return (), ()
     key_of = [key for key, at in problem.slices.items() for _ in range(at.start, at.stop)]
     kinds: dict[tuple[tuple[str, ...], bool], list[list[int]]] = {}
     combinations: list[dict[str, float]] = []

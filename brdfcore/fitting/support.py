@@ -94,7 +94,7 @@ def supports(samples: Samples) -> Support:
 def warnings(plan: Plan, support: Support, y: Tensor, typical: Tensor, loss: str) -> list[tuple[str, ...]]:
     """The sentences that concern what this plan fits to values y (M, C, N), by material.
 
-    They are about directions, the number of samples and their values, whose positive ones have the median `typical` (M,).
+    They are about directions, the number of samples and values, whose positive ones have the median `typical` (M,).
     """
     concerned = {"directions"} if plan.free else set()
     for term in plan.form.terms:
