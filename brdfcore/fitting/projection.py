@@ -139,16 +139,17 @@ class Projection:
         y = factor * data.y
         return factor, y, y.square().sum(-1)
 
-    def products(self, x: Tensor, which: Tensor | None) -> Products:
+    def products(self, x: Tensor, which: Tensor | None, *, derivatives: bool = True) -> Products:
         """The products at each row x (S, D), its own material's data: (S, W, Q, Q), (S, C, Q), (S, C)."""
         problem, starts = self.problem, len(x)
         problem.evaluations += starts
         natural = problem.natural(x)
+        evaluate = problem.columns.all if derivatives else problem.columns.values
         factor, y, squares = self._weighed
         own = which if which is not None and len(y) > 1 else None
         parts: list[tuple[Tensor, ...]] = []
         for begin, piece in problem.data.places(starts):
-            columns = problem.columns.all(natural, piece.g, starts, problem.channels)
+            columns = evaluate(natural, piece.g, starts, problem.channels)
             at = slice(begin, begin + len(piece.c))
             right = y[..., at] if own is None else y[..., at][own]
             weight = (factor[..., at] if own is None or len(factor) == 1 else factor[..., at][own]).unsqueeze(2)
@@ -234,6 +235,12 @@ class Projection:
             at = problem.slices[key]
             x[:, at] = problem.plan.form.parameters[key].to_raw(value[:, : at.stop - at.start])
         return x.clamp(problem.low, problem.high)
+
+    def solved(self, x: Tensor, which: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """The rows with their unknowns solved for, and their loss (S,)."""
+        affine = self.affine(x, slopes=False)
+        found = self.solve(self.products(x, which, derivatives=False), affine.offset, affine.a)
+        return self.write(x, found.z), found.loss
 
     def gram(self, x: Tensor, which: Tensor | None = None) -> tuple[Tensor, Gram]:
         """The rows with their unknowns solved for, and the normal equations of the shapes alone, 0 elsewhere."""

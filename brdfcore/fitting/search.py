@@ -22,12 +22,13 @@ from .problem import Problem
 from .projection import Projection
 from .result import Cost
 from .robust import ROBUST, SPREAD
-from .starts import scan, several_lobes
+from .starts import rescan, scan, several_lobes
 from .variable_projection import variable_projection
 
 SUBSET = 2000  # samples on which starts are told apart; the optimum is always polished on all
 _STARTS = 4  # best points of the scan, which run as one batch; of one shape half of them
 _MANY_STARTS = 16  # the same of two lobes and more, whose optima are many
+_AGAIN = 2  # starts of each of several lobes, whose shapes are searched again beside the best of the others
 _DESCENTS = 2  # starts of Adam and LBFGS, which run one after the other
 _POLISH = 300  # their steps on all the data, after the subset
 _NONLINEAR = 6  # starts of a lone lobe under a loss that is not linear in f, whose steps move every reflectance
@@ -136,24 +137,28 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     which = torch.arange(materials).repeat_interleave(each)
     x = starts.reshape(-1, whole.size)
     tell = _tell(say, 0.05, 0.5)
-    iterations = 0
     projected = optimizer == "auto" and projection.useful and bool(projection.shapes)
-    if projected:
-        if linear and not several_lobes(projection):
+    if projected and linear:
+        if not several_lobes(projection):
             hopeful = shares.reshape(-1) <= _HOPELESS
             x, which = x[hopeful], which[hopeful]
-        raced = variable_projection(projection, x, which, _RACE, on_step=tell)
-        iterations += raced.iterations
-        if linear:
-            outcome = least_squares(coarse, raced.x, which, on_step=tell) if projection.may_leave_the_box else raced
-        else:
+        best, iterations = _raced(projection, x, which, tell)
+        if several_lobes(projection):
+            again = torch.cat([best.x.unsqueeze(1), rescan(projection, best.x, _AGAIN, seed)], dim=1)
+            which = torch.arange(materials).repeat_interleave(again.shape[1])
+            best, more = _raced(projection, again.reshape(-1, whole.size), which, tell)
+            iterations += more
+    else:
+        iterations = 0
+        if projected:
+            raced = variable_projection(projection, x, which, _RACE, on_step=tell)
+            iterations += raced.iterations
             x = torch.cat([starts, raced.x.reshape(starts.shape)], dim=1).reshape(-1, whole.size)
             kept = _MANY_STARTS if several_lobes(projection) else _NONLINEAR
             x, which = _lowest(coarse, x, min(kept, 2 * each))
-    if not (projected and linear):
         outcome = least_squares(coarse, x, which, _RACE_ALL, on_step=tell)
         iterations += outcome.iterations
-    best = outcome.pick(_best(outcome.loss, which, materials))
+        best = outcome.pick(_best(outcome.loss, which, materials))
     name = "variable_projection" if projected and linear else "least_squares"
     rows = torch.arange(materials)
     tell = _tell(say, 0.5, 0.9)
@@ -167,6 +172,14 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     iterations += best.iterations
     seen = {id(p): p.evaluations for p in (whole, coarse, projection.problem)}
     return Found(whole, best, each, sum(seen.values()), iterations, name)
+
+
+def _raced(projection: Projection, x: Tensor, which: Tensor, tell: OnStep) -> tuple[Outcome, int]:
+    """Where the best of each material's starts x (S, D) ends, and the iterations that took."""
+    outcome = raced = variable_projection(projection, x, which, _RACE, on_step=tell)
+    if projection.may_leave_the_box:
+        outcome = least_squares(projection.problem, raced.x, which, on_step=tell)
+    return outcome.pick(_best(outcome.loss, which, projection.problem.materials)), raced.iterations
 
 
 def _lowest(problem: Problem, x: Tensor, count: int) -> tuple[Tensor, Tensor]:
