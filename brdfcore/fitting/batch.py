@@ -64,6 +64,6 @@ def _alike(samples: Samples) -> object:
             "bc.Samples.",
             field="samples",
         )
-    digest = hashlib.blake2b(samples.wi.contiguous().numpy())
-    digest.update(samples.wo.contiguous().numpy())
+    digest = hashlib.blake2b(samples.wi.numpy().tobytes())
+    digest.update(samples.wo.numpy().tobytes())
     return digest.digest(), samples.values.shape, samples.azimuth_observed, samples.sigma is None

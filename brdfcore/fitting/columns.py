@@ -158,8 +158,8 @@ class _TermColumns:
             with torch.no_grad():
                 if self.explicit is None:
                     return self.bases(own, g), []
-                model = cast(Lobe, self.term.model)
-                lobe, by = model.lobe(own, g), model.log_slopes(own, g)
+                lobe = cast(Lobe, self.term.model).lobe(own, g)
+                by = cast(WidthLobe, self.term.model).log_slopes(own, g)
                 bases, slopes = [lobe], [lobe * by[name] for name in self.explicit]
         if self.schlick:
             s = schlick(g.h_dot_wo)

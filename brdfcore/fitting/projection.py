@@ -159,7 +159,8 @@ class Projection:
             else:
                 data = (weighed @ right.unsqueeze(-1)).squeeze(-1)
             parts.append((weighed @ weighed.mT, data))
-        return Products(*_summed(parts), (squares if own is None else squares[own]).expand(starts, -1))
+        gram, data = _summed(parts)
+        return Products(gram, data, (squares if own is None else squares[own]).expand(starts, -1))
 
     def scan_products(self, x: Tensor) -> Products:
         """The products of the bases at each row of x (S, D) with the data of all materials: lead (S, M), or (S, 1)."""
@@ -182,7 +183,8 @@ class Projection:
                 right = (weighed.expand(-1, -1, problem.channels, -1, -1) @ here.unsqueeze(-1)).squeeze(-1)
                 gram = weighed @ weighed.mT
             parts.append((gram, right))
-        return Products(*_summed(parts), squares.unsqueeze(0))
+        gram, right = _summed(parts)
+        return Products(gram, right, squares.unsqueeze(0))
 
     def solve(self, products: Products, offset: Tensor, a: Tensor) -> Solved:
         """The unknowns and the loss for products of leading shape (...) and coefficients offset + A z."""

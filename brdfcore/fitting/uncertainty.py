@@ -54,8 +54,8 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     counted = (problem.data.root_weight.expand_as(problem.data.y) > 0).sum((1, 2))
     if problem.size == 0:
         none, square = x.bool(), x.new_zeros(len(x), 0, 0)
-        nothing = (Unseen.nothing(0),) * len(x)
-        return Uncertainty(x, x, x, square, x, none, none, none, counted, nothing, ((),) * len(x))
+        blank = (Unseen.nothing(0),) * len(x)
+        return Uncertainty(x, x, x, square, x, none, none, none, counted, blank, ((),) * len(x))
     gram = gram or problem.gram(x, which)
     if not all(bool(part.isfinite().all()) for part in (x, gram.gradient, gram.matrix)):
         size = problem.data.y.abs()
