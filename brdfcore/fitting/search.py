@@ -148,6 +148,7 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
             which = torch.arange(materials).repeat_interleave(again.shape[1])
             best, more = _raced(projection, again.reshape(-1, whole.size), which, tell)
             iterations += more
+            each += again.shape[1] - 1
     else:
         iterations = 0
         if projected:
