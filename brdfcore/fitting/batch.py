@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ..errors import SamplesError
 from ..formats.samples import Samples
 from ._fit import Teller, planned
@@ -66,5 +64,6 @@ def _alike(samples: Samples) -> object:
             "bc.Samples.",
             field="samples",
         )
-    digest = hashlib.sha256(np.concatenate([samples.wi.numpy(), samples.wo.numpy()]).tobytes()).digest()
-    return digest, samples.values.shape, samples.azimuth_observed, samples.sigma is None
+    digest = hashlib.blake2b(samples.wi.numpy().tobytes())
+    digest.update(samples.wo.numpy().tobytes())
+    return digest.digest(), samples.values.shape, samples.azimuth_observed, samples.sigma is None

@@ -5,10 +5,12 @@
 The bases b and their derivatives, the columns, hold what differs from sample to sample; the coefficients c and their
 derivatives hold what differs from channel to channel. A model computes a basis sample by sample, so with a parameter
 repeated over the samples one backward pass gives the derivative at each of them: no Jacobian-vector products, and
-nothing of torch.func, whose first use takes seconds (nor autograd's grad_outputs, which import as much).
+nothing of torch.func, whose first use takes seconds (nor autograd's grad_outputs, which import as much). Where a model
+gives the derivatives of its lobe's logarithm, even that pass is saved: it takes four times as long as the lobe itself.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import NamedTuple, cast
 
 import torch
@@ -16,9 +18,12 @@ from torch import Tensor
 
 from ..geometry import Geometry
 from ..models._fresnel_lobe import FresnelTerm
-from ..models.form import Form
+from ..models._half_vector import WidthLobe
+from ..models._scaled_lobe import ScaledLobe
+from ..models.form import Form, Term
 from ..models.fresnel import schlick
 
+Lobe = FresnelTerm | ScaledLobe
 Natural = Mapping[str, Tensor]  # key -> (S, 1, 1) or (S, 1, C), or (), (C,) for what is the same in all S
 
 
@@ -38,36 +43,19 @@ class Columns:
         self.keys = keys
         with torch.enable_grad():
             leaves = {key: start[key].detach().clone().requires_grad_() for key in keys}
-            bases, coefficients = self._parts({**start, **leaves}, g)
-            every = list(leaves.values())
-            reads = [_reached(basis, every) for basis in bases]
-            mixes = [_reached(coefficient, every) for coefficient in coefficients]
-        self.bases = len(bases)
-        self.multiples = self._multiples()
-        self.wide = any(basis.shape[-1] > 1 for basis in bases)  # shapes that have colour
-        self.derivatives = [(k, p) for k, found in enumerate(reads) for p in found]  # which basis, by which key
+            values, every = {**start, **leaves}, list(leaves.values())
+            bases = [term.model.basis(form.of_term(term, values), g) for term in form.terms]
+            reads = [[_reached(basis, every) for basis in each] for each in bases]
+            mixes = [_reached(coefficient, every) for coefficient in self._coefficients(values)]
+        flat = [found for each in reads for found in each]
+        self.bases = len(flat)
+        self.wide = any(basis.shape[-1] > 1 for each in bases for basis in each)  # shapes that have colour
+        self.derivatives = [(k, p) for k, found in enumerate(flat) for p in found]  # which basis, by which key
         self.coefficient_derivatives = [(k, p) for k, found in enumerate(mixes) for p in found]
-        self.shaping = [p for p in range(len(keys)) if any(p == q for _, q in self.derivatives)]
-
-    def _parts(self, values: Natural, g: Geometry) -> tuple[list[Tensor], list[Tensor]]:
-        bases: list[Tensor] = []
-        coefficients: list[Tensor] = []
-        for term in self.form.terms:
-            own = self.form.of_term(term, values)
-            bases.extend(term.model.basis(own, g))
-            coefficients.extend(term.model.coefficients(own))
-        return bases, coefficients
-
-    def _multiples(self) -> dict[int, int]:
-        """The bases that are Schlick's s times the basis before them, by index: their columns need no derivation."""
-        found: dict[int, int] = {}
-        at = 0
-        for term in self.form.terms:
-            count = len(term.model.typical_albedo)
-            if isinstance(term.model, FresnelTerm) and count == 2:
-                found[at + 1] = at
-            at += count
-        return found
+        self.terms = [
+            _TermColumns.of(term, [[keys[p] for p in found] for found in each], form.of_term(term, start), g)
+            for term, each in zip(form.terms, reads, strict=True)
+        ]
 
     def _coefficients(self, values: Natural) -> list[Tensor]:
         return [
@@ -76,42 +64,25 @@ class Columns:
 
     def values(self, natural: Natural, g: Geometry, starts: int, channels: int) -> Tensor:
         """The bases alone [1/sr], (S, W, K, N), with W = C where shapes have colour, else 1."""
+        out = torch.empty(starts, channels if self.wide else 1, self.bases, len(g.above), dtype=torch.float64)
         with torch.no_grad():
-            bases = self._bases(natural, g)
-            return self._stacked(bases, starts, channels if self.wide else 1, len(g.above))
+            bases = [b for one in self.terms for b in one.bases(self.form.of_term(one.term, natural), g)]
+        for k, basis in enumerate(bases):
+            out[:, :, k] = torch.atleast_2d(basis).mT
+        return out
 
     def all(self, natural: Natural, g: Geometry, starts: int, channels: int) -> Tensor:
         """The bases, then their derivatives by the natural values, (S, W, Q, N)."""
         count, width = len(g.above), channels if self.wide else 1
-        with torch.enable_grad():
-            repeated = {
-                p: natural[self.keys[p]].detach().expand(starts, count, width).requires_grad_() for p in self.shaping
-            }
-            bases = self._bases({**natural, **{self.keys[p]: leaf for p, leaf in repeated.items()}}, g)
-            slopes: list[Tensor] = []
-            for k, basis in enumerate(bases):
-                by = [repeated[p] for j, p in self.derivatives if j == k]
-                if k in self.multiples:
-                    slopes += [schlick(g.h_dot_wo) * slope for slope in slopes[len(slopes) - len(by) :]]
-                elif by:
-                    slopes += torch.autograd.grad(basis.sum(), by, retain_graph=True)
-        return self._stacked([basis.detach() for basis in bases] + slopes, starts, width, count)
-
-    def _bases(self, values: Natural, g: Geometry) -> list[Tensor]:
-        found: list[Tensor] = []
-        for term in self.form.terms:
-            own = self.form.of_term(term, values)
-            if len(found) + 1 in self.multiples:
-                lobe = cast(FresnelTerm, term.model).lobe(own, g)
-                found += [lobe, lobe.detach() * schlick(g.h_dot_wo)]
-            else:
-                found.extend(term.model.basis(own, g))
-        return found
-
-    def _stacked(self, columns: list[Tensor], starts: int, width: int, count: int) -> Tensor:
-        out = columns[0].new_empty(starts, width, len(columns), count)
-        for i, column in enumerate(columns):
-            out[:, :, i] = column.expand(starts, count, width).transpose(1, 2)
+        out = torch.empty(starts, width, self.bases + len(self.derivatives), count, dtype=torch.float64)
+        k, j = 0, self.bases
+        for one in self.terms:
+            bases, slopes = one.derived(self.form, natural, g, (starts, count, width))
+            for i, column in enumerate(bases):
+                out[:, :, k + i] = torch.atleast_2d(column).mT
+            for i, column in enumerate(slopes):
+                out[:, :, j + i] = torch.atleast_2d(column).mT
+            k, j = k + len(bases), j + len(slopes)
         return out
 
     def coefficients(self, natural: Natural, shape: tuple[int, ...]) -> Tensor:
@@ -148,6 +119,67 @@ class Columns:
         for j, (k, p) in enumerate(self.derivatives):
             slopes[..., self.bases + j, p] = coefficients[..., k]
         return Mix(value, slopes * chain.unsqueeze(-2))
+
+
+@dataclass(frozen=True)
+class _TermColumns:
+    """What one term adds to the columns."""
+
+    term: Term
+    reads: list[list[str]]  # the keys that shape each basis
+    schlick: bool  # the second basis is the first times Schlick's s, and so are its derivatives
+    explicit: tuple[str, ...] | None  # what shapes the lobe, where the model gives its logarithm's derivatives
+
+    @classmethod
+    def of(cls, term: Term, reads: list[list[str]], start: Natural, g: Geometry) -> "_TermColumns":
+        """A term whose bases read these keys."""
+        model = term.model
+        fresnel = isinstance(model, FresnelTerm) and len(model.typical_albedo) == 2
+        names = [key.removeprefix(f"{term.label}.") for key in reads[0]]
+        plain = isinstance(model, ScaledLobe) or (isinstance(model, FresnelTerm) and not model.exact)
+        known = model.log_slopes(start, g) if isinstance(model, WidthLobe) and plain else {}
+        # a shape that a tie takes from elsewhere is not among the names, or shapes the lobe by another's key
+        tied = {name for name in known if name in term.tied}
+        explicit = tuple(names) if names and set(names) <= set(known) and not tied else None
+        return cls(term, reads, fresnel, explicit)
+
+    def bases(self, own: Natural, g: Geometry) -> list[Tensor]:
+        """The term's bases at its own values."""
+        return list(self.term.model.basis(own, g))
+
+    def derived(
+        self, form: Form, natural: Natural, g: Geometry, shape: tuple[int, ...]
+    ) -> tuple[list[Tensor], list[Tensor]]:
+        """The bases and their derivatives, each (S, N, W) or broadcasting to it."""
+        if self.explicit is None and any(self.reads):
+            bases, slopes = self._by_backward_passes(form, natural, g, shape)
+        else:
+            own = form.of_term(self.term, natural)
+            with torch.no_grad():
+                if self.explicit is None:
+                    return self.bases(own, g), []
+                lobe = cast(Lobe, self.term.model).lobe(own, g)
+                by = cast(WidthLobe, self.term.model).log_slopes(own, g)
+                bases, slopes = [lobe], [lobe * by[name] for name in self.explicit]
+        if self.schlick:
+            s = schlick(g.h_dot_wo)
+            bases, slopes = [*bases, bases[0] * s], [*slopes, *(slope * s for slope in slopes)]
+        return bases, slopes
+
+    def _by_backward_passes(
+        self, form: Form, natural: Natural, g: Geometry, shape: tuple[int, ...]
+    ) -> tuple[list[Tensor], list[Tensor]]:
+        """The same, of the lobe alone where Schlick's s follows."""
+        with torch.enable_grad():
+            keys = {key for each in self.reads for key in each}
+            leaves = {key: natural[key].detach().expand(shape).requires_grad_() for key in keys}
+            own = form.of_term(self.term, {**natural, **leaves})
+            bases = [cast(FresnelTerm, self.term.model).lobe(own, g)] if self.schlick else self.bases(own, g)
+            slopes: list[Tensor] = []
+            for basis, each in zip(bases, self.reads, strict=False):
+                if each:
+                    slopes += torch.autograd.grad(basis.sum(), [leaves[key] for key in each], retain_graph=True)
+        return [basis.detach() for basis in bases], slopes
 
 
 def _reached(value: Tensor, leaves: list[Tensor]) -> list[int]:

@@ -28,14 +28,15 @@ class Data:
     def of(cls, samples: Sequence[Samples], needs: frozenset[str], loss: Loss, scales: Scales | None) -> "Data":
         """The data of samples with equal directions; the scales are theirs unless they are given."""
         first = samples[0]
+        c, y = first.wi[:, 2].contiguous(), torch.stack([one.values.T for one in samples])
         sigmas = [one.sigma.T for one in samples if one.sigma is not None]
         return cls(
             geometry(first.wi, first.wo, needs),
-            first.wi[:, 2].contiguous(),
-            torch.stack([one.values.T for one in samples]),
+            c,
+            y,
             stacked_weights(samples, loss).sqrt() if not sigmas else _alike([root_weights(s, loss) for s in samples]),
             torch.stack(sigmas) if len(sigmas) == len(samples) else None,
-            scales or Scales.stacked([Scales.of(one.values, one.wi[:, 2:]) for one in samples]),
+            scales or Scales.stacked(y, c),
         )
 
     def slice(self, begin: int, end: int) -> "Data":
@@ -64,10 +65,14 @@ class Data:
 
     def chunks(self, starts: int) -> Iterator["Data"]:
         """The data in pieces small enough for so many starts at once."""
+        return (piece for _, piece in self.places(starts))
+
+    def places(self, starts: int) -> Iterator[tuple[int, "Data"]]:
+        """Those pieces, each with the number of its first sample."""
         count = len(self.c)
         step = max(1, _CHUNK // max(1, starts))
         for begin in range(0, count, step):
-            yield self.slice(begin, min(begin + step, count)) if step < count else self
+            yield begin, self.slice(begin, min(begin + step, count)) if step < count else self
 
 
 def _alike(several: Sequence[Tensor]) -> Tensor:

@@ -149,12 +149,24 @@ def unseen(matrix: Tensor, level: Tensor, asked: Tensor, blind: Tensor, lengths:
     return Unseen(torch.cat([own.T, weak], dim=1), torch.cat([own * lengths, directions])[order], taking_part[order])
 
 
-def singular_values(matrix: Tensor, asked: Tensor, blind: Tensor) -> tuple[float, ...]:
-    """Those of one material's Jacobian over what is asked about, columns of unit length, falling; 0 for the blind."""
-    seen = asked & ~blind
-    spectrum = Spectrum.of(matrix[seen][:, seen].unsqueeze(0), seen[seen].unsqueeze(0))
-    values = spectrum.values[0].clamp(min=0).sqrt().flip(0).tolist()
-    return (*values, *(0.0 for _ in range(int((asked & blind).sum()))))
+def singular_values(matrix: Tensor, asked: Tensor, blind: Tensor) -> tuple[tuple[float, ...], ...]:
+    """Those of each material's Jacobian, from J^T J (M, D, D), over what is asked about (M, D), columns of unit length.
+
+    They fall; the blind have 0.
+    """
+    seen, silent = asked & ~blind, (asked & blind).sum(-1).tolist()
+    found: list[tuple[float, ...]] = [()] * len(matrix)
+    rows_of: dict[tuple[bool, ...], list[int]] = {}
+    for row, pattern in enumerate(seen.tolist()):
+        rows_of.setdefault(tuple(pattern), []).append(row)
+    for pattern, rows in rows_of.items():
+        at = torch.tensor(pattern).nonzero()[:, 0]
+        block = matrix[rows][:, at][:, :, at]
+        spectrum = Spectrum.of(block, torch.ones(block.shape[:2], dtype=torch.bool))
+        values = spectrum.values.clamp(min=0).sqrt().flip(1).tolist()
+        for row, own in zip(rows, values, strict=True):
+            found[row] = (*own, *(0.0 for _ in range(silent[row])))
+    return tuple(found)
 
 
 def _outer(x: Tensor) -> Tensor:
@@ -186,6 +198,8 @@ def named(
     says in how many. Channels that share a kind of combination are named once. A change is in the parameter's own unit,
     and a combination's have length 1; `chain` (D,) makes them of the raw ones.
     """
+    if not len(found.directions):
+        return (), ()
     key_of = [key for key, at in problem.slices.items() for _ in range(at.start, at.stop)]
     kinds: dict[tuple[tuple[str, ...], bool], list[list[int]]] = {}
     combinations: list[dict[str, float]] = []

@@ -11,7 +11,7 @@ channels. All are sums of squares. root(x) = (x + e)^(1/3) - e^(1/3) with e = 1 
 bounds the root's slope at zero. A negative y counts as 0 in log, in cube_root and in the denominator of relative.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
@@ -28,22 +28,22 @@ class Scales:
     @classmethod
     def of(cls, y: Tensor, c: Tensor) -> "Scales":
         """The scales of values y (N, C) and cosines c (N, 1); 1 where no value is positive."""
-
-        def median(x: Tensor) -> float:
-            positive = x[x > 0]
-            return float(positive.median()) if positive.numel() else 1.0
-
-        return cls(median(y), median(c * y))
+        return cls(float(_median(y.flatten())), float(_median((c * y).flatten())))
 
     @classmethod
-    def stacked(cls, scales: Sequence["Scales"]) -> "Scales":
-        """The scales of several materials, each (M, 1, 1)."""
-        y, cy = torch.tensor([[s.y, s.cy] for s in scales], dtype=torch.float64).T.reshape(2, -1, 1, 1)
-        return cls(y, cy)
+    def stacked(cls, y: Tensor, c: Tensor) -> "Scales":
+        """The scales, each (M, 1, 1), of the values y (M, C, N) of several materials and cosines c (N,)."""
+        return cls(*(_median(each.flatten(1)).reshape(-1, 1, 1) for each in (y, c * y)))
 
     def rows(self, index: Tensor) -> "Scales":
         """The scales of the materials that the index names."""
         return Scales(*(s[index] if isinstance(s, Tensor) else s for s in (self.y, self.cy)))
+
+
+def _median(x: Tensor) -> Tensor:
+    """The median of the positive values along the last axis; 1 where there is none."""
+    found = torch.where(x > 0, x, torch.nan).nanmedian(dim=-1).values
+    return torch.where(found.isnan(), 1.0, found)
 
 
 Difference = Callable[[Tensor, Tensor, Tensor, Scales], Tensor]

@@ -57,9 +57,13 @@ def noise(problem: Problem, x: Tensor, inverse: Tensor, which: Tensor, reach: Te
         left = 1 - (columns * (own @ columns)).sum(2)
         spread = (residuals / left.clamp(min=_ALONE)).square()
         seen, mild = left > _ALONE, left >= 0.5
-        total += (columns * torch.where(seen, spread, 0.0).unsqueeze(2)) @ columns.mT
-        low += (columns * torch.where(mild, spread, 0.0).unsqueeze(2)) @ columns.mT
-        high += (columns * (~mild).to(spread).unsqueeze(2)) @ columns.mT
+        here = (columns * torch.where(seen, spread, 0.0).unsqueeze(2)) @ columns.mT
+        total += here
+        if bool(mild.all()):
+            low += here
+        else:
+            low += (columns * torch.where(mild, spread, 0.0).unsqueeze(2)) @ columns.mT
+            high += (columns * (~mild).to(spread).unsqueeze(2)) @ columns.mT
         squares += residuals.square().sum(-1)
         weight = data.root_weight.square().expand_as(residuals)  # as if noise were constant
         left_over += torch.where(weight > 0, left, 0.0).sum(-1)

@@ -1,5 +1,6 @@
 """What a fit is asked: the text's form with its open options decided, and which values are free, fixed or gray."""
 
+import functools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -35,7 +36,7 @@ class Plan:
     max_theta: float | None = None  # [rad]
     conserve_energy: bool = False
 
-    @property
+    @functools.cached_property
     def free(self) -> tuple[str, ...]:
         """The keys that the fit determines, in the order of the text."""
         return tuple(key for key in self.form.parameters if key not in self.fixed)

@@ -9,6 +9,7 @@ over the columns of F that are free in their polytope. F, V and y are mixed from
 one product of those, [b | db/dp | y]^T [b | db/dp | y], summed in float64 over pieces of the data, serves all channels.
 """
 
+import functools
 from typing import NamedTuple
 
 import torch
@@ -130,47 +131,60 @@ class Projection:
         offset, offset_slopes = c[0] - (a * base).sum(0), d[0] - (a_slopes * base.unsqueeze(-1)).sum(0)
         return Affine(offset, a.movedim(0, -1), offset_slopes, a_slopes.movedim(0, -2))
 
-    def products(self, x: Tensor, which: Tensor | None, *, derivatives: bool) -> Products:
+    @functools.cached_property
+    def _weighed(self) -> tuple[Tensor, Tensor, Tensor]:
+        """What multiplies f - y in the residuals, (M, C, N) or broadcasting; that times y; its sums of squares."""
+        data = self.problem.data
+        factor = linear_factor(self.problem.loss_kind, data)
+        y = factor * data.y
+        return factor, y, y.square().sum(-1)
+
+    def products(self, x: Tensor, which: Tensor | None, *, derivatives: bool = True) -> Products:
         """The products at each row x (S, D), its own material's data: (S, W, Q, Q), (S, C, Q), (S, C)."""
         problem, starts = self.problem, len(x)
         problem.evaluations += starts
         natural = problem.natural(x)
-        parts: list[Products] = []
-        for piece in problem.data.chunks(starts):
-            data = piece if which is None else piece.rows(which)
-            columns = (
-                problem.columns.all(natural, data.g, starts, problem.channels)
-                if derivatives
-                else problem.columns.values(natural, data.g, starts, problem.channels)
-            )
-            factor = linear_factor(problem.loss_kind, data)
-            y = (factor * data.y).expand(starts, -1, -1)
-            weighed = columns * factor.unsqueeze(2)
-            right = (weighed[:, 0] @ y.mT).mT if weighed.shape[1] == 1 else (weighed @ y.unsqueeze(-1)).squeeze(-1)
-            parts.append(Products(weighed @ weighed.mT, right, y.square().sum(-1)))
-        return _summed(parts)
+        evaluate = problem.columns.all if derivatives else problem.columns.values
+        factor, y, squares = self._weighed
+        own = which if which is not None and len(y) > 1 else None
+        parts: list[tuple[Tensor, ...]] = []
+        for begin, piece in problem.data.places(starts):
+            columns = evaluate(natural, piece.g, starts, problem.channels)
+            at = slice(begin, begin + len(piece.c))
+            right = y[..., at] if own is None else y[..., at][own]
+            weight = (factor[..., at] if own is None or len(factor) == 1 else factor[..., at][own]).unsqueeze(2)
+            weighed = columns.mul_(weight) if weight.shape[1] <= columns.shape[1] else columns * weight
+            if weighed.shape[1] == 1:
+                data = (weighed[:, 0] @ right.mT).mT
+            else:
+                data = (weighed @ right.unsqueeze(-1)).squeeze(-1)
+            parts.append((weighed @ weighed.mT, data))
+        gram, data = _summed(parts)
+        return Products(gram, data, (squares if own is None else squares[own]).expand(starts, -1))
 
     def scan_products(self, x: Tensor) -> Products:
         """The products of the bases at each row of x (S, D) with the data of all materials: lead (S, M), or (S, 1)."""
         problem, starts = self.problem, len(x)
         problem.evaluations += starts
         natural = problem.natural(x)
-        parts: list[Products] = []
-        for data in problem.data.chunks(starts):
-            columns = problem.columns.values(natural, data.g, starts, problem.channels)  # (S, W, K, N)
-            factor = linear_factor(problem.loss_kind, data)
-            y = factor * data.y  # (M, C, N)
-            if columns.shape[1] == 1 and factor.shape[:2] == (1, 1):  # one product serves every material and channel
-                weighed = columns * factor
-                flat = weighed.reshape(-1, weighed.shape[-1]) @ y.reshape(-1, y.shape[-1]).T  # (S K, M C)
-                right = flat.reshape(starts, -1, *y.shape[:2]).permute(0, 2, 3, 1)
+        factor, y, squares = self._weighed
+        parts: list[tuple[Tensor, ...]] = []
+        for begin, piece in problem.data.places(starts):
+            columns = problem.columns.values(natural, piece.g, starts, problem.channels)  # (S, W, K, N)
+            at = slice(begin, begin + len(piece.c))
+            weight, here = factor[..., at], y[..., at]
+            if columns.shape[1] == 1 and weight.shape[:2] == (1, 1):  # one product serves every material and channel
+                weighed = columns.mul_(weight)
+                flat = weighed.reshape(-1, weighed.shape[-1]) @ here.reshape(-1, here.shape[-1]).T  # (S K, M C)
+                right = flat.reshape(starts, -1, *here.shape[:2]).permute(0, 2, 3, 1)
                 gram = (weighed @ weighed.mT).unsqueeze(1)
             else:
-                weighed = columns.unsqueeze(1) * factor.unsqueeze(2)  # (S, M, W, K, N)
-                right = (weighed.expand(-1, -1, problem.channels, -1, -1) @ y.unsqueeze(-1)).squeeze(-1)
+                weighed = columns.unsqueeze(1) * weight.unsqueeze(2)  # (S, M, W, K, N)
+                right = (weighed.expand(-1, -1, problem.channels, -1, -1) @ here.unsqueeze(-1)).squeeze(-1)
                 gram = weighed @ weighed.mT
-            parts.append(Products(gram, right, y.square().sum(-1).unsqueeze(0)))
-        return _summed(parts)
+            parts.append((gram, right))
+        gram, right = _summed(parts)
+        return Products(gram, right, squares.unsqueeze(0))
 
     def solve(self, products: Products, offset: Tensor, a: Tensor) -> Solved:
         """The unknowns and the loss for products of leading shape (...) and coefficients offset + A z."""
@@ -224,10 +238,16 @@ class Projection:
             x[:, at] = problem.plan.form.parameters[key].to_raw(value[:, : at.stop - at.start])
         return x.clamp(problem.low, problem.high)
 
+    def solved(self, x: Tensor, which: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """The rows with their unknowns solved for, and their loss (S,)."""
+        affine = self.affine(x, slopes=False)
+        found = self.solve(self.products(x, which, derivatives=False), affine.offset, affine.a)
+        return self.write(x, found.z), found.loss
+
     def gram(self, x: Tensor, which: Tensor | None = None) -> tuple[Tensor, Gram]:
         """The rows with their unknowns solved for, and the normal equations of the shapes alone, 0 elsewhere."""
         problem = self.problem
-        products, affine = self.products(x, which, derivatives=True), self.affine(x)
+        products, affine = self.products(x, which), self.affine(x)
         solved = self.solve(products, affine.offset, affine.a)
         z, a = solved.z, affine.a
         c = affine.offset + (a @ z.unsqueeze(-1)).squeeze(-1)
@@ -264,8 +284,10 @@ class Projection:
         return out.index_add_(1, flat, across.reshape(len(across), -1)).reshape(-1, self.size, problem.size)
 
 
-def _summed(parts: list[Products]) -> Products:
-    return Products(*(torch.stack(each).sum(0) for each in zip(*parts, strict=True)))
+def _summed(parts: list[tuple[Tensor, ...]]) -> list[Tensor]:
+    if len(parts) == 1:
+        return list(parts[0])
+    return [torch.stack(each).sum(0) for each in zip(*parts, strict=True)]
 
 
 def _projected(inner: Tensor, across: Tensor) -> Tensor:

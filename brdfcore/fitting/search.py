@@ -22,15 +22,17 @@ from .problem import Problem
 from .projection import Projection
 from .result import Cost
 from .robust import ROBUST, SPREAD
-from .starts import scan, several_lobes
+from .starts import rescan, scan, several_lobes
 from .variable_projection import variable_projection
 
 SUBSET = 2000  # samples on which starts are told apart; the optimum is always polished on all
 _STARTS = 4  # best points of the scan, which run as one batch; of one shape half of them
 _MANY_STARTS = 16  # the same of two lobes and more, whose optima are many
+_AGAIN = 2  # starts of each of several lobes, whose shapes are searched again beside the best of the others
 _DESCENTS = 2  # starts of Adam and LBFGS, which run one after the other
 _POLISH = 300  # their steps on all the data, after the subset
 _NONLINEAR = 6  # starts of a lone lobe under a loss that is not linear in f, whose steps move every reflectance
+_HOPELESS = 2.0  # times the best point's loss, from where a lone lobe's other points lead nowhere else
 _RACE_ALL = 1e-6  # of the loss, the same as the next where reflectances move too
 _RACE = 1e-4  # of the loss: what another step would gain once a start's end is clear
 
@@ -130,26 +132,34 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     linear = projection.problem is coarse
     few_starts = _STARTS if len(projection.shapes) > 1 else _STARTS // 2
     count = _MANY_STARTS if several_lobes(projection) else few_starts
-    starts = scan(coarse, projection, count, seed)
+    starts, shares = scan(coarse, projection, count, seed)
     each = starts.shape[1]
     which = torch.arange(materials).repeat_interleave(each)
     x = starts.reshape(-1, whole.size)
     tell = _tell(say, 0.05, 0.5)
-    iterations = 0
     projected = optimizer == "auto" and projection.useful and bool(projection.shapes)
-    if projected:
-        raced = variable_projection(projection, x, which, _RACE, on_step=tell)
-        iterations += raced.iterations
-        if linear:
-            outcome = least_squares(coarse, raced.x, which, on_step=tell) if projection.may_leave_the_box else raced
-        else:
+    if projected and linear:
+        if not several_lobes(projection):
+            hopeful = shares.reshape(-1) <= _HOPELESS
+            x, which = x[hopeful], which[hopeful]
+        best, iterations = _raced(projection, x, which, tell)
+        if several_lobes(projection):
+            again = torch.cat([best.x.unsqueeze(1), rescan(projection, best.x, _AGAIN, seed)], dim=1)
+            which = torch.arange(materials).repeat_interleave(again.shape[1])
+            best, more = _raced(projection, again.reshape(-1, whole.size), which, tell)
+            iterations += more
+            each += again.shape[1] - 1
+    else:
+        iterations = 0
+        if projected:
+            raced = variable_projection(projection, x, which, _RACE, on_step=tell)
+            iterations += raced.iterations
             x = torch.cat([starts, raced.x.reshape(starts.shape)], dim=1).reshape(-1, whole.size)
             kept = _MANY_STARTS if several_lobes(projection) else _NONLINEAR
             x, which = _lowest(coarse, x, min(kept, 2 * each))
-    if not (projected and linear):
         outcome = least_squares(coarse, x, which, _RACE_ALL, on_step=tell)
         iterations += outcome.iterations
-    best = outcome.pick(_best(outcome.loss, materials))
+        best = outcome.pick(_best(outcome.loss, which, materials))
     name = "variable_projection" if projected and linear else "least_squares"
     rows = torch.arange(materials)
     tell = _tell(say, 0.5, 0.9)
@@ -165,6 +175,14 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     return Found(whole, best, each, sum(seen.values()), iterations, name)
 
 
+def _raced(projection: Projection, x: Tensor, which: Tensor, tell: OnStep) -> tuple[Outcome, int]:
+    """Where the best of each material's starts x (S, D) ends, and the iterations that took."""
+    outcome = raced = variable_projection(projection, x, which, _RACE, on_step=tell)
+    if projection.may_leave_the_box:
+        outcome = least_squares(projection.problem, raced.x, which, on_step=tell)
+    return outcome.pick(_best(outcome.loss, which, projection.problem.materials)), raced.iterations
+
+
 def _lowest(problem: Problem, x: Tensor, count: int) -> tuple[Tensor, Tensor]:
     """The rows x (M R, D) whose own loss is lowest, so many a material, and the material of each."""
     which = torch.arange(problem.materials).repeat_interleave(len(x) // problem.materials)
@@ -174,16 +192,17 @@ def _lowest(problem: Problem, x: Tensor, count: int) -> tuple[Tensor, Tensor]:
     return x[chosen.reshape(-1)], torch.arange(problem.materials).repeat_interleave(count)
 
 
-def _best(loss: Tensor, materials: int) -> Tensor:
-    """The row of each material whose loss is lowest, (M,)."""
-    by_material = torch.where(loss.isfinite(), loss, torch.inf).reshape(materials, -1)
-    return by_material.argmin(1) + by_material.shape[1] * torch.arange(materials)
+def _best(loss: Tensor, which: Tensor, materials: int) -> Tensor:
+    """The row of each material, named by `which` (S,), whose loss (S,) is lowest, (M,)."""
+    own = which == torch.arange(materials).unsqueeze(-1)
+    loss = loss.nan_to_num(nan=torch.inf).clamp(max=torch.finfo(loss.dtype).max)  # its own, even where none is finite
+    return torch.where(own, loss, torch.inf).argmin(1)
 
 
 def _descents(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: str, seed: int, say: Say) -> Found:
     """Adam or LBFGS from a few starts one after the other, then from the best on all the data."""
     run = {"adam": adam, "lbfgs": lbfgs}[optimizer]
-    starts = scan(coarse, _kindred(coarse, few), _DESCENTS, seed)
+    starts, _ = scan(coarse, _kindred(coarse, few), _DESCENTS, seed)
     ends: list[Outcome] = []
     share = 0.9 / starts[..., 0].numel()
     for material in range(whole.materials):

@@ -72,14 +72,25 @@ class Faces:
         lower = sum(not upper for upper, _, _ in made)
         return cls(blocks, torch.stack([o for _, o, _ in made]), torch.stack([d for _, _, d in made]), lower)
 
-    def outside(self, z: Tensor, *, below: bool) -> Tensor:
-        """Where z (..., C, L) leaves the polytope, through its lower ends or its upper ones, (..., C)."""
+    def channels(self, channel: Tensor) -> "Faces":
+        """The same of chosen channels (P,), again and again where they repeat."""
+        blocks = tuple(Block(block.at, block.low[channel], block.high[channel]) for block in self.blocks)
+        return Faces(blocks, self.origin[:, channel], self.directions, self.lower)
+
+    def below(self, z: Tensor) -> Tensor:
+        """Where z (..., C, L) leaves the polytope through its lower ends, (..., C)."""
         out = torch.zeros(z.shape[:-1], dtype=torch.bool)
         for block in self.blocks:
             for i in block.at:
-                out |= (z[..., i] < block.low) if below else torch.zeros_like(out)
-            total = z[..., list(block.at)].sum(-1)
-            out |= torch.zeros_like(out) if below else total > block.high * (1 + 1e-12)
+                out |= z[..., i] < block.low
+        return out
+
+    def beyond(self, z: Tensor) -> Tensor:
+        """Where z (..., C, L) leaves it through its upper ends, (..., C)."""
+        out = torch.zeros(z.shape[:-1], dtype=torch.bool)
+        for block in self.blocks:
+            total = z[..., block.at[0]] if len(block.at) == 1 else z[..., block.at[0]] + z[..., block.at[1]]
+            out |= total > block.high * (1 + 1e-12)
         return out
 
 
@@ -89,41 +100,36 @@ def solve_faces(faces: Faces, gram: Tensor, right: Tensor) -> tuple[Tensor, Tens
     channels, count = shape[-2:]
     gram = gram.expand(*shape, count).reshape(-1, channels, count, count)
     right = right.expand(shape).reshape(-1, channels, count)
-    z, face = _best(faces, faces.origin[:1], faces.directions[:1], gram, right)
-    below = faces.outside(z, below=True).any(-1)
-    if bool(below.any()):
-        lower = faces.origin[: faces.lower], faces.directions[: faces.lower]
-        z[below], face[below] = _best(faces, *lower, gram[below], right[below])
-    beyond = faces.outside(z, below=False)
-    if bool(beyond.any()):
-        rows, channel = beyond.nonzero(as_tuple=True)
-        again, picked = _best(faces, faces.origin, faces.directions, gram[rows], right[rows], within=True)
-        each = torch.arange(len(rows))
-        z[rows, channel], face[rows, channel] = again[each, channel], picked[each, channel]
+    z, face = _best(faces, 1, gram, right)
+    for leaves, among in ((faces.below, faces.lower), (faces.beyond, len(faces.origin))):
+        row, channel = leaves(z).nonzero(as_tuple=True)
+        if len(row):
+            systems = gram[row, channel].unsqueeze(0), right[row, channel].unsqueeze(0)
+            again, picked = _best(faces.channels(channel), among, *systems)
+            z[row, channel], face[row, channel] = again[0], picked[0]
     return z.reshape(shape), faces.directions[face].reshape(*shape, count)
 
 
-def _best(
-    faces: Faces, origin: Tensor, directions: Tensor, gram: Tensor, right: Tensor, *, within: bool = False
-) -> tuple[Tensor, Tensor]:
-    """The best feasible z (B, C, L) among the given faces, and which face it is on (B, C)."""
-    start = origin.unsqueeze(0)  # (1, F, C, L)
-    d = directions.unsqueeze(1)  # (F, 1, L, L)
+def _best(faces: Faces, among: int, gram: Tensor, right: Tensor) -> tuple[Tensor, Tensor]:
+    """The best z (B, C, L) of those on so many of the first faces that leave no end of theirs, and its face (B, C)."""
+    start = faces.origin[:among].unsqueeze(0)  # (1, F, C, L)
+    d = faces.directions[:among].unsqueeze(1)  # (F, 1, L, L)
     g, r = gram.unsqueeze(1), right.unsqueeze(1)  # (B, 1, C, L, L), (B, 1, C, L)
-    slope = r - (g * start.unsqueeze(-2)).sum(-1) if bool(origin.any()) else r
-    if within:
+    slope = r - (g * start.unsqueeze(-2)).sum(-1) if bool(start.any()) else r
+    if among > faces.lower:
         system, wanted = d.mT @ g @ d, (d.mT @ slope.unsqueeze(-1)).squeeze(-1)
         t = solve_definite(system, wanted)
         z = start + (d @ t.unsqueeze(-1)).squeeze(-1)  # (B, F, C, L)
+        wrong = faces.below(z) | faces.beyond(z)
     else:  # along axes: no products of tiny matrices
         e = d.diagonal(dim1=-2, dim2=-1)
         system, wanted = g * e.unsqueeze(-1) * e.unsqueeze(-2), slope * e
         t = solve_definite(system, wanted)
         z = start + t
+        wrong = faces.below(z)
+    if among == 1:
+        return z[:, 0], torch.zeros(z[:, 0, :, 0].shape, dtype=torch.long)
     value = -(t * wanted).sum(-1) - (start * (slope + r)).sum(-1)
-    wrong = faces.outside(z, below=True)
-    if within:
-        wrong |= faces.outside(z, below=False)
     face = torch.where(wrong, torch.inf, value).argmin(1)  # (B, C)
     return z.gather(1, face[:, None, :, None].expand(-1, 1, -1, z.shape[-1])).squeeze(1), face
 

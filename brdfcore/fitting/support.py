@@ -5,9 +5,11 @@ directions; anisotropy where the sample was turned. What is said after the fit (
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor
 
 from ..formats.samples import Samples
 from ..models.form import Term
@@ -89,33 +91,49 @@ def supports(samples: Samples) -> Support:
     return Support(*shape, (smallest, largest), theta_d, samples.azimuth_observed, limits)
 
 
-def warnings(plan: Plan, support: Support, samples: Samples, loss: str) -> tuple[str, ...]:
-    """The sentences that concern what this plan fits to these samples: their directions, number and values."""
+def warnings(plan: Plan, support: Support, y: Tensor, typical: Tensor, loss: str) -> list[tuple[str, ...]]:
+    """The sentences that concern what this plan fits to values y (M, C, N), by material.
+
+    They are about directions, the number of samples and values, whose positive ones have the median `typical` (M,).
+    """
     concerned = {"directions"} if plan.free else set()
     for term in plan.form.terms:
         concerned |= _concerns(plan, term)
     found = [sentence for effect, sentence in support.limits.items() if effect in concerned]
-    y = samples.values
+    _, channels, count = y.shape
     sizes = {key: plan.start[key].numel() for key in plan.free}
-    each = sum(size == y.shape[1] for size in sizes.values())
-    if sum(sizes.values()) > y.numel() or each > len(y):
+    each = sum(size == channels for size in sizes.values())
+    if sum(sizes.values()) > channels * count or each > count:
         found.append(
-            f"{sum(sizes.values())} values are fitted to {len(y)} samples of {y.shape[1]} channels, which are too few "
+            f"{sum(sizes.values())} values are fitted to {count} samples of {channels} channels, which are too few "
             "to determine them all. Fix some, or measure more."
         )
-    if plan.free and bool((y <= 0).all()):
-        found.append("No value is positive, so a reflectance of 0 fits best and no shape can be seen. Check the data.")
-    elif concerned - {"directions"} and len(y) > 1 and bool((y == y[0]).all()):
-        found.append("All samples have the same value, in which no lobe can be seen. A diffuse term alone fits them.")
-    bright = y[y > 0]
-    if concerned - {"directions"} and LOSSES[loss].statistical and len(bright):
-        ratio = float(bright.max() / bright.median())
-        if ratio > 10**_DECADES:
-            found.append(
-                f"The largest value is {ratio:.1g} times the median, so the {loss} loss sees little but the peak. "
-                'Choose loss="log", "cube_root" or "relative" if the rest matters.'
-            )
-    return tuple(found)
+    has_lobe = bool(concerned - {"directions"})
+    sees_peak = has_lobe and LOSSES[loss].statistical
+    largest, constant = y.amax((1, 2)), (y == y[..., :1]).all(-1).all(-1)
+    rows = zip(largest.tolist(), (largest / typical).tolist(), constant.tolist(), strict=True)
+    return [
+        (
+            *found,
+            *_of_values(
+                top, ratio if sees_peak else 0.0, loss, free=bool(plan.free), same=same and has_lobe and count > 1
+            ),
+        )
+        for top, ratio, same in rows
+    ]
+
+
+def _of_values(largest: float, ratio: float, loss: str, *, free: bool, same: bool) -> Iterator[str]:
+    """The sentences about one material's values: their largest, over the median of the positive ones, all the same."""
+    if free and largest <= 0:
+        yield "No value is positive, so a reflectance of 0 fits best and no shape can be seen. Check the data."
+    elif same:
+        yield "All samples have the same value, in which no lobe can be seen. A diffuse term alone fits them."
+    if ratio > 10**_DECADES:
+        yield (
+            f"The largest value is {ratio:.1g} times the median, so the {loss} loss sees little but the peak. "
+            'Choose loss="log", "cube_root" or "relative" if the rest matters.'
+        )
 
 
 def _concerns(plan: Plan, term: Term) -> set[str]:

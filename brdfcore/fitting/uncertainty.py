@@ -54,8 +54,8 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     counted = (problem.data.root_weight.expand_as(problem.data.y) > 0).sum((1, 2))
     if problem.size == 0:
         none, square = x.bool(), x.new_zeros(len(x), 0, 0)
-        nothing = (Unseen.nothing(0),) * len(x)
-        return Uncertainty(x, x, x, square, x, none, none, none, counted, nothing, ((),) * len(x))
+        blank = (Unseen.nothing(0),) * len(x)
+        return Uncertainty(x, x, x, square, x, none, none, none, counted, blank, ((),) * len(x))
     gram = gram or problem.gram(x, which)
     if not all(bool(part.isfinite().all()) for part in (x, gram.gradient, gram.matrix)):
         size = problem.data.y.abs()
@@ -73,7 +73,8 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     lengths = ranges(problem)
     loose = held & ~blind & _loose(problem, gram, spectrum, sums.level, lengths)
     suspect = is_suspect(matrix, sums.level, spectrum, lengths) | (loose | (blind & ~held)).any(-1)
-    found = [Unseen.nothing(problem.size)] * len(x)
+    nothing = Unseen.nothing(problem.size)
+    found = [nothing] * len(x)
     for row in suspect.nonzero()[:, 0].tolist():
         parts = (blind[row], lengths, magnitudes(problem, x)[row])
         one = unseen(matrix[row], sums.level[row], ~held[row] | loose[row], *parts)
@@ -85,7 +86,9 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     undetermined = torch.stack([one.taking_part.any(0) for one in found])
     free_directions = torch.tensor([len(one.directions) for one in found])
     freedom = counted - (~held).sum(-1) + free_directions
-    kept, over_range = (torch.stack(each) for each in zip(*(one.kept(lengths) for one in found), strict=True))
+    keeps_all = nothing.kept(lengths)
+    parts_kept = [keeps_all if one is nothing else one.kept(lengths) for one in found]
+    kept, over_range = (torch.stack(each) for each in zip(*parts_kept, strict=True))
     unknown, degrees = sums.unknown, sums.freedom
     if bool(suspect.any()):
         spectrum = Spectrum.of(matrix, ~held & ~blind)
@@ -104,7 +107,7 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     finite = error.isfinite()
     both = finite.unsqueeze(-1) & finite.unsqueeze(-2)
     covariance = torch.where(both, chain.unsqueeze(-1) * covariance * chain.unsqueeze(-2), math.nan)
-    values = tuple(singular_values(*each) for each in zip(matrix, ~held, blind, strict=True))
+    values = singular_values(matrix, ~held, blind)
     ends = _natural(problem, x, error, factor, chain)
     return Uncertainty(*ends, covariance, chain, undetermined, vague, held, freedom, tuple(found), values)
 

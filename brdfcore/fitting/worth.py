@@ -34,18 +34,23 @@ def fits(
     if problem.data.sigma is not None:
         chi_square = ((f - problem.data.y) / problem.data.sigma).square().sum((1, 2)).tolist()
     freedom, minima, ends = known.freedom.tolist(), outcome.loss.tolist(), outcome.converged.tolist()
-    support = supports(fitted[0])
+    typical = torch.as_tensor(problem.data.scales.y, dtype=torch.float64).reshape(-1)
+    told = warnings(plan, supports(fitted[0]), problem.data.y, typical, problem.loss_kind.name)
+    names = [name_of(problem, at, channels) for at in range(problem.size)]
+    certain = known.covariance.diagonal(dim1=-2, dim2=-1).isfinite()
+    of_row = {key: value.reshape(len(x), *plan.start[key].shape).unbind() for key, value in values.items()}
+    held, vague = known.held.tolist(), known.vague.tolist()
     found = []
     for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
         error = every_error[row]
         parameters, standard_errors, intervals = described[row]
         undetermined, combinations = named(problem, known.unseen[row], known.chain[row], channels)
-        certain = known.covariance[row].diagonal().isfinite()
+        kept = certain[row].nonzero()[:, 0]
         found.append(
             Fit(
                 plan=plan,
                 form=plan.form,
-                values={key: value[row].reshape(plan.start[key].shape) for key, value in values.items()},
+                values={key: each[row] for key, each in of_row.items()},
                 samples=samples,
                 parameters=parameters,
                 standard_errors=standard_errors,
@@ -53,14 +58,16 @@ def fits(
                 undetermined=undetermined,
                 combinations=combinations,
                 singular_values=known.singular_values[row],
-                covariance=known.covariance[row][certain][:, certain],
-                covariance_keys=tuple(name_of(problem, at, channels) for at in certain.nonzero()[:, 0].tolist()),
+                covariance=known.covariance[row, kept[:, None], kept],
+                covariance_keys=tuple(names[at] for at in kept.tolist()),
                 errors=error,
                 loss=problem.loss_kind.name,
                 objective=minima[row] if weighed or plan.robust else error[problem.loss_kind.name],
                 status=("undetermined" if undetermined else "converged") if ends[row] else "stopped_early",
-                message=_message(problem, known, row, undetermined, converged=ends[row], weighed=weighed),
-                warnings=warnings(plan, support, samples, problem.loss_kind.name),
+                message=_message(
+                    problem, held[row], vague[row], undetermined, freedom[row], converged=ends[row], weighed=weighed
+                ),
+                warnings=told[row],
                 choices=plan.choices,
                 fixed=tuple(sorted(plan.fixed)),
                 gray=tuple(sorted(plan.gray)),
@@ -135,9 +142,16 @@ def _described(problem: Problem, values: dict[str, Tensor], known: Uncertainty) 
 
 
 def _message(
-    problem: Problem, known: Uncertainty, row: int, undetermined: Sequence[str], *, converged: bool, weighed: bool
+    problem: Problem,
+    held: list[bool],
+    vague: list[bool],
+    undetermined: Sequence[str],
+    freedom: int,
+    *,
+    converged: bool,
+    weighed: bool,
 ) -> str:
-    """What the user must know of a result, in sentences."""
+    """What the user must know of a result, in sentences; `held` and `vague` are by raw position."""
     if not problem.size:
         parts = ["Every value is fixed, so this is an evaluation."]
     elif converged:
@@ -146,7 +160,6 @@ def _message(
         parts = [
             "The optimizer stopped before the optimum; treat values and intervals with care, or use least_squares."
         ]
-    held = known.held[row].tolist()
     on_end = [key for key, at in problem.slices.items() if any(held[at])]
     if on_end:
         where = " in some channel" if problem.channels > 1 else ""
@@ -160,12 +173,12 @@ def _message(
             f"The data do not determine {', nor '.join(together)} one by one, only together; no number is given for "
             "any of them. Fix one of them, or measure where their effects differ."
         )
-    vague = [key for key, at in problem.slices.items() if bool(known.vague[row, at].any())]
-    if vague:
+    few = [key for key, at in problem.slices.items() if any(vague[at])]
+    if few:
         parts.append(
-            f"Few samples decide {', '.join(vague)}, so an interval there is as long as the range that is searched."
+            f"Few samples decide {', '.join(few)}, so an interval there is as long as the range that is searched."
         )
-    if problem.data.sigma is None and int(known.freedom[row]) <= 0:
+    if problem.data.sigma is None and freedom <= 0:
         parts.append("There are no more samples than values, so no interval can be given.")
     if weighed:
         parts.append("Samples were weighted by 1/sigma^2, so the minimised loss is chi-square.")

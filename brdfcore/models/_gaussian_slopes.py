@@ -41,6 +41,14 @@ class GaussianSlopes(HalfVectorLobe):
             return (g.p / wx).square() + (g.q / wy).square()
         return g.e2 / wx / wx  # not by the square: its gradient would overflow in float32
 
+    def width_slopes(self, values: Values, g: Geometry) -> dict[str, Tensor]:
+        """The derivatives of ln(E / (ax ay)) by the widths, by name, each (..., 1)."""
+        if self.anisotropic:
+            pairs = zip(self.width_names, self.widths(values), (g.p, g.q), strict=True)
+            return {name: (2 * (slope / w).square() - 1) / w for name, w, slope in pairs}
+        (name,), (w, _) = self.width_names, self.widths(values)
+        return {name: (g.e2 / w / w - 1) * (2 / w)}
+
     def slopes(self, values: Values, u: Tensor) -> tuple[Tensor, Tensor]:
         """Gaussian slopes p, q (..., 1)."""
         wx, wy = self.widths(values)

@@ -29,6 +29,13 @@ class WidthLobe(Model):
     widths_along: ClassVar[tuple[str, str, str]] = ("a", "ax", "ay")  # the width's names: isotropic, along x, along y
     width: ClassVar[Parameter]  # what they have in common; its description is without the unit
 
+    def log_slopes(self, values: Values, g: Geometry) -> dict[str, Tensor]:
+        """The derivatives of the lobe's logarithm, by name, each (..., 1), for float64.
+
+        Where all that shape a lobe are here, fits multiply the lobe by them; elsewhere they differentiate the basis.
+        """
+        return {}
+
     @property
     def anisotropic(self) -> bool:
         """Whether the two principal directions have widths of their own."""

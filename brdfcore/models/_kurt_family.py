@@ -33,9 +33,15 @@ class KurtFamily(FresnelLobe, GaussianSlopes):
         root = torch.exp(-0.5 * self.exponent(values, g)) * (1 + g.e2)  # squared only here: (1 + e2)^2 could overflow
         lobe = root.square() / (4 * math.pi * mx * my) * g.over_h_dot_wo
         over = self.over_shadowing(values, g)
+        if lobe.dtype == torch.float64:
+            return lobe * over  # at most 1e160: the geometry's floor is 7e-49
         # The product alone can overflow, in float32 at grazing angles. Near that it has no gradient, since sums of
         # overflowing derivatives would be NaN, and it stops at the largest number.
         largest = torch.finfo(lobe.dtype).max
         limit = 2.0**-20 * largest / lobe.detach()
         beyond = (lobe.detach() * over.detach()).clamp(max=largest)
         return torch.where(over < limit, lobe * torch.minimum(over, limit), beyond)
+
+    def log_slopes(self, values: Values, g: Geometry) -> dict[str, Tensor]:
+        """Those by the widths, which nothing but D reads."""
+        return self.width_slopes(values, g)

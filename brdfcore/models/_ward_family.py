@@ -34,3 +34,7 @@ class WardFamily(ScaledLobe, GaussianSlopes):
         """The lobe for rs = 1 [1/sr], (..., 1)."""
         wx, wy = self.widths(values)
         return self.factor(g, self.exponent(values, g)) / (math.pi * wx * wy)
+
+    def log_slopes(self, values: Values, g: Geometry) -> dict[str, Tensor]:
+        """Those by the widths, which nothing but E / (ax ay) reads."""
+        return self.width_slopes(values, g)

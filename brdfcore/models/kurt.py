@@ -17,6 +17,7 @@ Source: SIGGRAPH Computer Graphics 44(1), 2010, eqs. 4, 5, 10, 12; sampling eqs.
 Departure: evaluated from the half vector's slopes p, q, so nothing is lost near the normal or at the horizon.
 """
 
+import torch
 from torch import Tensor
 
 from ..geometry import Geometry
@@ -33,3 +34,7 @@ class Kurt(KurtFamily):
     def over_shadowing(self, values: Values, g: Geometry) -> Tensor:
         """(ci co)^-alpha [1], (..., 1)."""
         return (g.over_ci * g.over_co) ** values["alpha"]
+
+    def log_slopes(self, values: Values, g: Geometry) -> dict[str, Tensor]:
+        """Those by the widths, and by alpha."""
+        return {**super().log_slopes(values, g), "alpha": torch.log(g.over_ci * g.over_co)}

@@ -28,5 +28,7 @@ def measured_from(text: str, count: int = 300, noise: float = 0.0, seed: int = 1
     with torch.no_grad():
         f = bc.material(text).f(wi, wo)
     deviation = torch.full_like(f, noise)
-    y = f + deviation / wi[:, 2:] * torch.randn(f.shape, generator=torch.Generator().manual_seed(seed), dtype=f.dtype)
+    # a stream of its own: that of the directions would tie the noise to where a sample lies
+    stream = torch.Generator().manual_seed(2**31 + seed)
+    y = f + deviation / wi[:, 2:] * torch.randn(f.shape, generator=stream, dtype=f.dtype)
     return bc.Samples(wi, wo, y, sigma=deviation / wi[:, 2:] if sigma else None)

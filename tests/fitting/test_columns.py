@@ -17,17 +17,37 @@ CHOICES = [choice for model in bc.MODELS.values() for choice in model.with_words
 
 @pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: f"{choice.name}({','.join(choice.options)})")
 def test_columns_are_the_models_bases_and_their_derivatives(choice: bc.Model) -> None:
+    text = f"{choice.name}({', '.join(choice.options)})" if choice.options else choice.name
+    check_columns(text, {})
+
+
+@pytest.mark.parametrize(
+    ("text", "fixed"),
+    [
+        ("kurt(isotropic, dielectric)", {"kurt.eta": 1.5}),
+        ("kurt(anisotropic)", {"kurt.mx": 0.2}),
+        ("kurt(isotropic)", {"kurt.m": 0.2, "kurt.alpha": 0.1}),
+    ],
+)
+def test_columns_of_values_that_are_fixed(text: str, fixed: dict[str, float]) -> None:
+    check_columns(text, fixed)
+
+
+def test_columns_of_a_tied_width() -> None:
+    check_columns("ward + kurt(m=ward.a)", {})
+
+
+def check_columns(text: str, fixed: dict[str, float]) -> None:
     """Against each model's own `basis`, differentiated sample by sample in central differences."""
     samples = measured_from("lambert(kd=0.2)", count=12)
-    text = f"{choice.name}({', '.join(choice.options)})" if choice.options else choice.name
-    problem = Problem(plan(1, text), samples, LOSSES["cosine"])
+    problem = Problem(plan(1, text, fixed=fixed), samples, LOSSES["cosine"])
     x = problem.pack(problem.plan.start).unsqueeze(0)
     columns = problem.columns.all(problem.natural(x), problem.data.g, 1, 1)[0, 0]
-    term = problem.plan.form.terms[0]
+    form = problem.plan.form
 
     def bases(values: dict[str, torch.Tensor]) -> torch.Tensor:
-        found = term.model.basis(problem.plan.form.of_term(term, values), problem.data.g)
-        return torch.stack([basis.detach().expand(12, 1)[:, 0] for basis in found])
+        each = [term.model.basis(form.of_term(term, values), problem.data.g) for term in form.terms]
+        return torch.stack([basis.detach().expand(12, 1)[:, 0] for found in each for basis in found])
 
     start = problem.plan.start
     torch.testing.assert_close(columns[: problem.columns.bases], bases(start), rtol=1e-12, atol=0)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import statistics
 
 import numpy as np
 import pytest
@@ -88,11 +89,15 @@ def test_scattered_incidences_become_bands_of_theta() -> None:
 
 
 def test_a_model_of_too_many_values_is_seen_through() -> None:
-    """It does better at its own samples, and worse at those left out."""
-    samples = measured_from("lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.2)", count=60, noise=0.02)
-    plain, rich = bc.held_out(samples, MODEL), bc.held_out(samples, "lambert + kurt(isotropic)")
-    assert rich.fitted < 0.99 * plain.fitted
-    assert rich.error > 1.05 * plain.error
+    """Of five data sets, most of its fits do better at their own samples, and worse at those left out."""
+    own, others = [], []
+    for seed in range(1, 6):
+        samples = measured_from("lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.2)", 30, noise=0.02, seed=seed)
+        plain, rich = bc.held_out(samples, MODEL), bc.held_out(samples, "lambert + kurt(isotropic)")
+        own.append(rich.fitted / plain.fitted)
+        others.append(rich.error / plain.error)
+    assert statistics.median(own) < 0.98
+    assert statistics.median(others) > 1.02
     assert bc.held_out(samples, "lambert").error > 3 * plain.error
 
 
