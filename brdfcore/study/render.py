@@ -53,7 +53,7 @@ def render(
         panel, times = _ways(name, material, size, counts, seed, rows)
         panels.append(panel)
         wins.append((name, times))
-    worth = _effects(size, counts[-1], seed, rows)
+    worth, without = _effects(size, counts[-1], seed, rows)
     samples = tuple(dict.fromkeys((64, counts[-1])))
     pairs: dict[str, tuple[Image, Image]] = {}
     for model in models or tuple(MODELS):
@@ -71,7 +71,10 @@ def render(
         "What do an image's noise and its effects cost?",
         COLUMNS,
         (*rows, *at_grazing, *fitted),
-        (Chart("render", "Error of an image against its time", tuple(panels)),),
+        (
+            Chart("render", "Error of an image against its time", tuple(panels)),
+            Chart("render-effects", "Error and time of an image without one of its effects", (without,)),
+        ),
         _sentence(wins, worth),
         (
             "Floors, the corner and the papers' scenes are held against four times as many samples of another seed, "
@@ -107,8 +110,10 @@ def _ways(
     return Panel(name, tuple(curves)), to_goal
 
 
-def _effects(size: int, samples: int, seed: int, rows: list[tuple[Cell, ...]]) -> dict[str, tuple[float, float]]:
-    """For each effect of a sphere in an open corner, the share of time it takes and the error without it."""
+def _effects(
+    size: int, samples: int, seed: int, rows: list[tuple[Cell, ...]]
+) -> tuple[dict[str, tuple[float, float]], Panel]:
+    """For each effect of a sphere in an open corner, the share of time it takes and the error without it; a panel."""
     ball = "coupled_lambert(kd=0.4, f0=ggx.f0) + ggx(anisotropic, schlick, ks=1, f0=0.05, ax=0.1, ay=0.3)"
     objects = (
         Sphere(center=(0, 0, 1), radius=1, material=ball, name="ball"),  # type: ignore[arg-type]
@@ -123,7 +128,7 @@ def _effects(size: int, samples: int, seed: int, rows: list[tuple[Cell, ...]]) -
     reference, _ = timed(many, whole, seed + 1)
     image, full = timed(scene, whole, seed)
     rows.append(row("corner", "everything", image, full, reference))
-    worth = {}
+    worth, points = {}, [Curve("everything", (full,), (error(image, reference),))]
     for effect in whole.effects:
         simple = effect.name.endswith(("lambert", "ggx", "fresnel")) or effect.name in (
             "shadow rays",
@@ -135,7 +140,8 @@ def _effects(size: int, samples: int, seed: int, rows: list[tuple[Cell, ...]]) -
             image, seconds = timed(scene, plan(scene, 1e-3, {effect.name: False}, bounces=3), seed)
             rows.append(row("corner", f"without {effect.name}", image, seconds, reference))
             worth[effect.name] = (1 - seconds / full, error(image, reference))
-    return worth
+            points.append(Curve(f"without {effect.name}", (seconds,), (error(image, reference),)))
+    return worth, Panel("a ball in an open corner", tuple(points))
 
 
 def _samples_of(

@@ -29,6 +29,8 @@ def test_effects_and_models_have_their_rows(study) -> None:
     error = {what: numbers[1] for (case, what, _), numbers in rows.items() if case == "corner"}
     assert error["without floor: lambert"] > 3 * error["everything"]
     assert error["without interreflection 1"] > error["without interreflection 2"]
+    drawn = {curve.label: curve.y[0] for curve in study.charts[1].panels[0].curves}
+    assert drawn == error
     even, skewed = rows["lambert", "its own samples", 64], rows["ward_bounded", "its own samples", 64]
     assert even[1] < 1e-6 < skewed[1] < 0.5
     assert even[2] is None or even[2] > 100
