@@ -11,7 +11,7 @@ from brdfcore.study.report import to_dict, write
 
 @pytest.fixture(scope="module")
 def study():
-    return STUDIES["render"](quick=True, size=5, counts=(8, 64), models=("lambert", "ward_bounded"))
+    return STUDIES["render"](quick=True, size=5, counts=(8, 32), models=("lambert", "ward_bounded"))
 
 
 def test_noise_falls_with_the_samples(study) -> None:
