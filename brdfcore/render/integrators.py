@@ -28,6 +28,17 @@ Uniform = Callable[[int, int], Tensor]  # (N, K) numbers in [0, 1)
 
 
 @dataclass(frozen=True, eq=False)
+class _Step:
+    """Material samples: where they go, (N, 3), their density [1/sr] and weight, and what they meet first."""
+
+    direction: Tensor
+    density: Tensor  # (N,)
+    ratio: Tensor  # (N, C) or (N, 1), f cos theta_i / pdf [1]
+    distance: Tensor  # (N,), inf where they meet nothing or were not traced
+    shape: Tensor  # (N,), -1 there
+
+
+@dataclass(frozen=True, eq=False)
 class Integrator:
     """A scene under a plan."""
 
@@ -85,41 +96,52 @@ class Integrator:
         """One sample for each vertex of what `exact` leaves, (N, C)."""
         scene, depth = self.plan.scene, self.plan.depth
         by_light, by_material = self.plan.on(LIGHT_SAMPLING), self.plan.on(BRDF_SAMPLING)
-        shadows, total = self.plan.on(SHADOWS), vertices.point.new_zeros(len(vertices), scene.channels)
+        total = vertices.point.new_zeros(len(vertices), scene.channels)
         path, weight = torch.arange(len(vertices), device=total.device), total.new_ones(len(vertices), 1)
         for bounce in range(depth + 1):
             if not len(vertices):
                 break
-            gathered = (
-                self._closed_form(vertices) if bounce and self._delta else vertices.point.new_zeros(len(vertices), 1)
-            )
+            gathered = total.new_zeros(len(vertices), 1)
+            if bounce and self._delta:
+                gathered = self._closed_form(vertices)
             if by_light:
                 gathered = gathered + self._light_samples(vertices, uniform)
-            if by_material or bounce < depth:
-                wi = self._drawn(vertices, uniform(len(vertices), 3))
-                density = self._pdf(vertices, wi)
-                reflected = self._reflected(vertices, wi)
-                empty = (density == 0).unsqueeze(-1)
-                ratio = torch.where(empty, 0.0, reflected / torch.where(empty, 1.0, density.unsqueeze(-1)))
-                towards = vertices.world(wi)
-                t, shape = None, None
-                if shadows or bounce < depth:
-                    t, shape = nearest(scene.objects, vertices.point, towards, vertices.shape)
-                if by_material:
-                    limit = t if shadows and t is not None else torch.full_like(density, torch.inf)
-                    for light in self._sampled:
-                        distance, other = light.met(vertices.point, vertices.normal, towards)
-                        share = (distance * NEARER < limit).to(density.dtype)
-                        if by_light:
-                            share = share * power_heuristic(density, other)
-                        gathered = gathered + ratio * share.unsqueeze(-1) * light.colour(density)
+            step = self._step(vertices, uniform, bounce < depth) if by_material or bounce < depth else None
+            if by_material and step is not None:
+                gathered = gathered + self._met_lights(vertices, step)
             total = total.index_add(0, path, (weight * gathered).expand(len(path), scene.channels))
-            if bounce < depth:
-                assert t is not None and shape is not None  # noqa: S101, PT018 - for mypy: a further bounce traces
-                goes = torch.nonzero((shape >= 0) & (ratio.detach() != 0).any(-1)).squeeze(-1)
-                path, weight = path[goes], (weight * ratio)[goes]
-                point = vertices.point[goes] + t[goes].unsqueeze(-1) * towards[goes]
-                vertices = arrive(scene.objects, shape[goes], point, towards[goes])
+            if step is None or bounce == depth:
+                break
+            goes = torch.nonzero((step.shape >= 0) & (step.ratio.detach() != 0).any(-1)).squeeze(-1)
+            path, weight = path[goes], (weight * step.ratio)[goes]
+            point = vertices.point[goes] + step.distance[goes].unsqueeze(-1) * step.direction[goes]
+            vertices = arrive(scene.objects, step.shape[goes], point, step.direction[goes])
+        return total
+
+    def _step(self, vertices: Vertices, uniform: Uniform, further: bool) -> "_Step":
+        """A material sample at each vertex; it is traced where shadows or a further bounce ask for that."""
+        wi = self._drawn(vertices, uniform(len(vertices), 3))
+        density = self._pdf(vertices, wi)
+        empty = (density == 0).unsqueeze(-1)
+        ratio = self._reflected(vertices, wi) / torch.where(empty, 1.0, density.unsqueeze(-1))
+        direction = vertices.world(wi)
+        if further or self.plan.on(SHADOWS):
+            distance, shape = nearest(self.plan.scene.objects, vertices.point, direction, vertices.shape)
+        else:
+            distance, shape = torch.full_like(density, torch.inf), torch.full_like(vertices.shape, -1)
+        return _Step(direction, density, torch.where(empty, 0.0, ratio), distance, shape)
+
+    def _met_lights(self, vertices: Vertices, step: "_Step") -> Tensor:
+        """What material samples bring from the lights that they meet, (N, C) or (N, 1)."""
+        total = torch.zeros_like(step.density).unsqueeze(-1)
+        shadows, by_light = self.plan.on(SHADOWS), self.plan.on(LIGHT_SAMPLING)
+        for light in self._sampled:
+            distance, other = light.met(vertices.point, vertices.normal, step.direction)
+            free = distance * NEARER < step.distance if shadows else ~distance.isinf()
+            share = free.to(step.density)
+            if by_light:
+                share = share * power_heuristic(step.density, other)
+            total = total + step.ratio * share.unsqueeze(-1) * light.colour(share)
         return total
 
     def _closed_form(self, vertices: Vertices) -> Tensor:

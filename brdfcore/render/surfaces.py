@@ -14,7 +14,7 @@ mean is that of the f above, whatever f is.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import torch
 from torch import Tensor
@@ -92,12 +92,8 @@ class Surface:
         """Albedos [1] with the error claimed for them, (angles, azimuths, C), for theta [rad]."""
         if self.black:
             return torch.zeros(1, 1, 1, dtype=torch.float64)
-        with torch.no_grad():
-            values = self.values(theta)
-            azimuths = 1 if symmetry(self.form, values).isotropic else AZIMUTHS
-            phi = torch.linspace(0, torch.pi / 2, azimuths, dtype=torch.float64)
-            found = of_form(self.form, values, torch.cos(theta)[:, None], phi, tolerance)
-        return found.values + found.error.nan_to_num(posinf=0.0)
+        numbers = {key: tuple(value.detach().reshape(-1).tolist()) for key, value in self.values(theta).items()}
+        return _albedos(self.form, tuple(numbers.items()), tuple(theta.tolist()), tolerance)
 
     def frozen(self) -> Material:
         """The kept terms as a material of its own, without derivatives."""
@@ -134,6 +130,19 @@ class Surface:
         with torch.no_grad():
             u = u.clamp(max=1 - torch.finfo(u.dtype).eps / 2)
             return self.form.sample(self.values(wo), wo, u)
+
+
+@lru_cache(maxsize=1024)  # plans of one scene, with this or that forced, ask the same
+def _albedos(
+    form: Form, numbers: tuple[tuple[str, tuple[float, ...]], ...], angles: tuple[float, ...], tolerance: float
+) -> Tensor:
+    """What `Surface.albedos` returns, for the values' numbers."""
+    theta = torch.tensor(angles, dtype=torch.float64)
+    values = {key: torch.tensor(value, dtype=torch.float64) for key, value in numbers}
+    azimuths = 1 if symmetry(form, values).isotropic else AZIMUTHS
+    phi = torch.linspace(0, torch.pi / 2, azimuths, dtype=torch.float64)
+    found = of_form(form, values, torch.cos(theta)[:, None], phi, tolerance)
+    return found.values + found.error.nan_to_num(posinf=0.0)
 
 
 def simplified(model: Model, words: frozenset[str]) -> Model:

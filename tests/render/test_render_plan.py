@@ -59,6 +59,15 @@ def test_faint_terms_and_needless_options_are_left_out():
     assert plan(lone_sphere(compensated, [SKY]), 1e-6).on("sphere 1: ggx compensation")
 
 
+def test_what_is_remembered_is_of_these_values():
+    """A material that an optimiser has changed is planned anew."""
+    scene = lone_sphere("lambert(kd=0.5)", [SKY])
+    before = plan(scene)["sphere 1: lambert"].error
+    with torch.no_grad():
+        next(iter(scene.objects[0].material.parameters())).fill_(0.2)
+    assert plan(scene)["sphere 1: lambert"].error < 0.5 * before
+
+
 @pytest.mark.parametrize("light", [SUN, SKY, LAMP], ids=["sun", "sky", "lamp"])
 def test_what_is_left_out_is_bounded(light):
     """Each bound holds, effect by effect: the image with it off differs by no more."""
