@@ -1,6 +1,7 @@
 """The ASGI application, and the server around it."""
 
 import contextlib
+import functools
 import json
 import logging
 import time
@@ -14,7 +15,7 @@ from starlette.types import ASGIApp
 
 import brdfcore as bc
 
-from . import errors, examples
+from . import errors, examples, renders
 from .datasets import Datasets
 from .guard import Guard, JsonLines
 from .jobs.dispatcher import Dispatcher
@@ -69,6 +70,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             if chosen.keep_days:
                 before = time.time() - 86400 * chosen.keep_days
                 jobs, files = store.forget(before), datasets.forget(before, store.asks_for)
+                renders.forget(chosen.data, before, functools.partial(store.mentioned, "render"))
                 _log.info("removed %d jobs and %d datasets older than %g days", jobs, files, chosen.keep_days)
 
         def ended(job_id: str, reason: str) -> None:

@@ -3,14 +3,11 @@
 import dataclasses
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from ._bar import with_bar
-
-if TYPE_CHECKING:
-    pass
 
 
 def command(
@@ -19,7 +16,9 @@ def command(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="A .png or linear .npy; by default SCENE.png.", show_default=False),
+        typer.Option(
+            "--output", "-o", help="A .png, or linear .exr or .npy; by default SCENE.png.", show_default=False
+        ),
     ] = None,
     tolerance: Annotated[float, typer.Option(help="Radiance that the plan may leave out.")] = 1e-3,
     samples: Annotated[int | None, typer.Option(help="Samples a pixel; by default the scene's.")] = None,
@@ -29,21 +28,27 @@ def command(
     force_off: Annotated[list[str] | None, typer.Option("--off", help="An effect to leave out; repeatable.")] = None,
     seed: Annotated[int, typer.Option(help="Of the samples.")] = 0,
     device: Annotated[str, typer.Option(help="cpu or cuda.")] = "cpu",
+    contours: Annotated[
+        Path | None,
+        typer.Option(help="Also draw lines of equal luminance over it, as .svg or .png.", show_default=False),
+    ] = None,
     plan_only: Annotated[bool, typer.Option("--plan", help="Print the plan only.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Render a scene; print which effects were simulated, and why. Without a SCENE, list the shipped ones."""
-    from ..errors import InvalidValueError
+    from .. import plots
     from ..render import SCENES, Scene, plan, render
-    from ..render.image import check_suffix
+    from ..render._checks import device as check_device
+    from ..render.image import check_path
 
     if scene is None:
         typer.echo("\n".join(SCENES))
         return
     path = output or Path(f"{Path(scene).stem}.png")
-    check_suffix(path)  # what cannot be written is refused before the work, not after it
-    if device not in ("cpu", "cuda"):
-        raise InvalidValueError(f"Expected --device to be cpu or cuda, got {device!r}. Choose one.", field="device")
+    if contours is not None:
+        plots.kind_of(contours)
+    check_path(path)  # what cannot be written is refused before the work, not after it
+    check_device(device)
     made = Scene.load(scene)
     changed = {name: value for name, value in (("samples", samples), ("noise", noise)) if value is not None}
     made = dataclasses.replace(made, **changed) if changed else made  # type: ignore[arg-type]
@@ -51,14 +56,12 @@ def command(
     chosen = plan(made, tolerance, force, bounces)
     if not as_json:
         typer.echo(str(chosen))
-    found: dict[str, Any] = {
-        "effects": [vars(effect) | {"error": _finite(effect.error)} for effect in chosen.effects],
-        "error": _finite(chosen.error),
-        "met": chosen.met,
-    }
+    found = chosen.to_dict()
     if not plan_only:
         image = with_bar("render", lambda progress: render(made, chosen, seed=seed, device=device, progress=progress))
         image.save(path)
+        if contours is not None:
+            plots.save(plots.contours(image, title=Path(scene).stem), contours)
         noise_found = float(image.noise.square().mean().sqrt())
         found |= {"file": str(path), "seconds": image.seconds, "samples": image.samples, "noise": noise_found}
         if not as_json:
@@ -66,8 +69,3 @@ def command(
             typer.echo(f"{path}: {image.seconds:.1f} s, {sampled}")
     if as_json:
         typer.echo(json.dumps(found, indent=2, allow_nan=False))
-
-
-def _finite(x: float) -> float | None:
-    """A number that JSON has; null where nothing bounds it."""
-    return x if x < float("inf") else None

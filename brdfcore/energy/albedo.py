@@ -3,9 +3,9 @@
     a(wo) = integral of f(wi, wo) cos theta_i dwi over the hemisphere                                        [1]
 
 Each term is integrated by the cheapest rule that suits it: its exact form (closed_forms.py), one integral of one
-dimension (chords.py, own_lobes.py), rays over the disc of slopes (slope_disc.py), and for a lobe of which nothing is
-known adaptive cells in the coordinates of its samples (hemisphere.py). Nodes are added where the claimed error is too
-large (refinement.py). Everything is computed in double precision, whatever the material's is.
+dimension (chords.py, arcs.py, own_lobes.py), rays over the disc of slopes (slope_disc.py), and for a lobe of which
+nothing is known adaptive cells in the coordinates of its samples (hemisphere.py). Nodes are added where the claimed
+error is too large (refinement.py). Everything is computed in double precision, whatever the material's is.
 """
 
 import math

@@ -8,7 +8,8 @@ horizon begins to cut the lobe. T d.u = tau cos(t - t1), so that the angles of n
 
 with w equally spaced: T d.u = kappa sinh(Y cos w) goes through every order of magnitude from kappa to tau. The map is
 analytic and periodic, and the identity for Y = 0. A long and narrow lobe has a second such place, its narrow axis: then
-two maps follow each other. A lobe with kinks is integrated over pieces of the circle on which it is smooth.
+two maps follow each other. The masking of a long and narrow lobe with a tail has two more, which a third map meets by
+a sum of densities (Dense). A lobe with kinks is integrated over pieces of the circle on which it is smooth.
 """
 
 import math
@@ -25,6 +26,11 @@ HORIZON = 0.1  # T d.u at which the horizon is still beyond exp(-25) of a Gaussi
 ALGEBRAIC_HORIZON = 0.01  # the same for a lobe whose tail is longer
 NEGLIGIBLE_LAYER = 100  # times the error that may be neglected
 IDENTITY = 1e-9  # a Y for which the map is the identity to rounding
+SHARE, SCALES, FACTOR = 0.08, 5, 3.5  # of each kernel of a dense map, how many there are, and how their widths grow
+FINEST, WIDEST = 1e-3, 1.0  # widths of kernels
+POINTS, STEPS = 129, 3  # about each place, between which a map is inverted, and steps of Newton's method from there
+LOPSIDED = 0.3  # a ratio of widths below which a Smith lobe's masking has features at the horizon
+SLIGHT = 1e5  # times the error that may be neglected: what a tail is worth whose features need not be met
 
 
 class Rays(NamedTuple):
@@ -44,6 +50,46 @@ def graded(w: Tensor, y: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     inner = y * torch.cos(w)
     root = torch.sqrt(_sinh_ratio(2 * y * torch.sin(w / 2).square()) * _sinh_ratio(2 * y * torch.cos(w / 2).square()))
     return torch.sinh(inner) / torch.sinh(y), torch.sin(w) * (root / _sinh_ratio(y)), torch.cosh(inner) / root
+
+
+class Dense(NamedTuple):
+    """A map v -> w of the circle onto itself that is dense at some angles.
+
+    v is proportional to w + share sum over places a and widths d of 2 atan(coth(d/2) tan((w - a)/2)), the integral of
+    Poisson's kernel sinh d / (cosh d - cos(w - a)): of widths in proportion the sum falls like 1/|w - a|.
+    """
+
+    share: Tensor  # of each kernel beside the identity, (R, 1); 0 for rows that need none
+    place: Tensor  # (R, K)
+    width: Tensor  # (R, K)
+
+    def before(self, w: Tensor) -> tuple[Tensor, Tensor]:
+        """The v of w (R, M) and dv/dw."""
+        ahead, slope = torch.zeros_like(w), torch.zeros_like(w)  # of the identity
+        for place, level in zip(self.place.split(1, 1), torch.tanh(0.5 * self.width).split(1, 1), strict=True):
+            sine = torch.sin(0.5 * (w - place))
+            sine2, double = sine.square(), sine * torch.cos(0.5 * (w - place))
+            ahead = ahead + 2 * torch.atan((1 - level) * double / (level + (1 - level) * sine2))
+            slope = slope + level / (level.square() + (1 - level) * (1 + level) * sine2)
+        whole = 1 + self.share * self.place.shape[1]
+        return w + self.share / whole * ahead, (1 + self.share * slope) / whole
+
+    def at(self, v: Tensor) -> tuple[Tensor, Tensor]:
+        """The w of v (1, M), up to turns, and dw/dv."""
+        finest = self.width[:, ::SCALES, None]
+        spread = torch.linspace(-1, 1, POINTS, dtype=v.dtype, device=v.device) * torch.asinh(math.pi / finest)
+        points = (self.place[:, ::SCALES, None] + finest * torch.sinh(spread)).flatten(1)
+        points = torch.remainder(points, 2 * math.pi).sort(1).values
+        points = torch.cat([points, points[:, :1] + 2 * math.pi], 1)
+        known = self.before(points)[0]
+        v = known[:, :1] + torch.remainder(v - known[:, :1], 2 * math.pi)
+        at = torch.searchsorted(known, v.contiguous(), right=True).clamp(1, known.shape[1] - 1)
+        (low, high), (start, end) = ((x.gather(1, at - 1), x.gather(1, at)) for x in (known, points))
+        w = start + (end - start) * ((v - low) / (high - low).clamp(min=1e-30)).clamp(0, 1)
+        for _ in range(STEPS):
+            found, slope = self.before(w)
+            w = w + (v - found) / slope
+        return w, 1 / self.before(w)[1]
 
 
 def _sinh_ratio(x: Tensor) -> Tensor:
@@ -80,6 +126,46 @@ class Circle:
             kept = layer.square() > NEGLIGIBLE_LAYER * error * self.tau
             finest = torch.where(kept, torch.minimum(kappa, layer), kappa)
             self.fine = torch.asinh(self.tau * stretch / finest).clamp(min=IDENTITY)
+        self.dense = self._dense(rows, error) if two and profile.smith and profile.fall == "algebraic" else None
+
+    def _dense(self, rows: Rows, error: float) -> Dense | None:
+        """The map that is dense where wi, at the horizon, lies along the narrow axis; None where no row needs it.
+
+        There a Smith lobe's masking of wi, like the square root of (narrow x)^2 + (wide y)^2 + z^2 with y along the
+        wide axis, has a kink at y = 0, rounded by narrow / wide. Its half vector's ray is the sum of wi and wo.
+        """
+        narrow, wide = torch.minimum(self.wx, self.wy), torch.maximum(self.wx, self.wy)
+        needed = (narrow < LOPSIDED * wide) & (narrow.pow(3) / wide > SLIGHT * error)
+        if not bool(needed.any()):
+            return None
+        everyone = torch.arange(len(needed), device=needed.device)
+        sine = torch.sqrt((1 - rows.co) * (1 + rows.co))[:, None]
+        xo, yo = sine * torch.cos(rows.azimuth)[:, None], sine * torch.sin(rows.azimuth)[:, None]
+        place, width = [], []
+        for side in (1.0, -1.0):
+            x, y = torch.where(self.swapped, xo, xo + side), torch.where(self.swapped, yo + side, yo)
+            w = self._before(x / self.wx, y / self.wy)
+            *at, slope = self.at(everyone, w, self.steepness)
+            turn = slope * self.wx * self.wy / ((self.wx * at[0]).square() + (self.wy * at[1]).square())
+            along = side * torch.where(self.swapped, yo, xo)
+            by_wi = (1 + along) / (1 + 2 * along + sine.square()).clamp(min=FINEST)  # d phi of h by that of wi
+            finest = (by_wi * narrow / wide / turn).clamp(FINEST, WIDEST)
+            for k in range(SCALES):
+                place.append(w)
+                width.append((finest * FACTOR**k).clamp(max=WIDEST))
+        return Dense(SHARE * needed.double(), torch.cat(place, 1), torch.cat(width, 1))
+
+    def _before(self, x: Tensor, y: Tensor) -> Tensor:
+        """The angle w, before both maps, of the ray with cos t, sin t in proportion to x and y, (R, 1)."""
+
+        def ungraded(cosine: Tensor, sine: Tensor, steepness: Tensor) -> Tensor:
+            level = torch.asinh(cosine * torch.sinh(steepness)) / steepness
+            return torch.acos(level.clamp(-1, 1)) * torch.where(sine < 0, -1.0, 1.0)
+
+        norm = torch.hypot(x, y)
+        cosine, sine = torch.where(self.swapped, x, y) / norm, torch.where(self.swapped, y, -x) / norm
+        inner = ungraded(cosine, sine, self.first) - self.start
+        return ungraded(torch.cos(inner), torch.sin(inner), self.steepness)
 
     def _set_narrow_axis(self) -> Tensor:
         """Set the first map, which is dense at the narrow axis, and return its slope where T d.u = 0."""
@@ -121,8 +207,12 @@ class Circle:
         """
         if self.profile.kink == "none":
             rule, panels = ring(2 * size, mirrored=not self.two).to(self.tau.device), 1
-            cos_t, sin_t, from_wo, slope = self.at(chosen, rule.nodes, self.steepness[chosen])
-            weight = slope * rule.weights
+            w, weight = rule.nodes, rule.weights
+            if self.dense is not None:
+                w, denser = Dense(*(part[chosen] for part in self.dense)).at(w[None])
+                weight = weight * denser
+            cos_t, sin_t, from_wo, slope = self.at(chosen, w, self.steepness[chosen])
+            weight = slope * weight
         else:
             rule = gauss(size).to(self.tau.device)
             pieces = []

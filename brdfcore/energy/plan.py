@@ -15,10 +15,11 @@ from ..errors import InvalidValueError, unknown_name
 from ..models._smith import SmithLobe
 from ..models.form import Form, Term
 from ..parameters import Values
+from .arcs import Arcs
 from .chords import Chords
 from .closed_forms import EXACT, returned
 from .hemisphere import Hemisphere
-from .lobes import PROFILES
+from .lobes import PROFILES, anisotropic
 from .own_lobes import Lump, PowerCosine
 from .product import Product
 from .refinement import Integral, Rows
@@ -34,7 +35,12 @@ METHODS = {
     "monte_carlo": "the mean weight of the material's own samples, for comparison",
     "sobol": "the same for scrambled Sobol points, for comparison",
 }
-SINGLE: dict[str, type[Integral]] = {"ward_bounded": Chords, "lafortune": PowerCosine, "edwards": Lump}
+SINGLE: dict[str, type[Integral]] = {
+    "ward_bounded": Chords,
+    "ward_neumann": Arcs,  # isotropic
+    "lafortune": PowerCosine,
+    "edwards": Lump,
+}
 RULES: dict[str, type[Integral] | type[Hemisphere]] = {
     "slope_disc": SlopeDisc,
     "hemisphere": Hemisphere,
@@ -160,8 +166,9 @@ def plan(
 def _method(term: Term, method: str) -> str:
     """The method that integrates a term; raises where the one that was asked for does not suit it."""
     name = term.model.name
+    closed = name in EXACT or (name in SINGLE and not (name == "ward_neumann" and anisotropic(term.model)))
     suited = [
-        *(["closed_form"] if name in EXACT or name in SINGLE else []),
+        *(["closed_form"] if closed else []),
         *(["slope_disc"] if name in PROFILES else []),
         "hemisphere",
         "gauss_legendre",

@@ -68,7 +68,7 @@ class SlopeDisc(Integral):
         self.profile = PROFILES[model.name]
         self.two = anisotropic(model)
         # Beckmann's masking is smooth, but not analytic, at wi = n: that takes many nodes
-        self.last = LADDER.index(2048), LADDER.index(320 if self.profile.fall == "algebraic" else 768)
+        self.last = LADDER.index(2048), LADDER.index(768)
         self.pieces = {"none": 1, "equal": 2, "grooves": 3}[self.profile.kink]  # into which kinks part a ray
         with torch.no_grad():
             self.circle = Circle(self.profile, rows, slope_widths(model, self.place), self.two, error)

@@ -3,6 +3,7 @@
 A form's file holds one `Exporter`; listing it in EXPORTS is all that library, command line and service need.
 """
 
+import math
 import re
 from dataclasses import replace
 from os import PathLike
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import InvalidValueError, unknown_name
-from ..models.material import Material
+from ..models.material import Material, check_material
 from . import brdf_explorer, material_json, merl, mitsuba, radiance
 from ._export import Export, Exporter, Orientation
 
@@ -35,6 +36,7 @@ def export(
     material's x axis points in the scene, for a form that states it (radiance). The name that some forms give the
     material is the path's stem, or "brdf".
     """
+    check_material(material)
     if format not in EXPORTS:
         raise unknown_name("format", str(format), EXPORTS, field="format")
     exporter = EXPORTS[format]
@@ -44,15 +46,25 @@ def export(
             "Turn the mesh's tangents instead.",
             field="orientation",
         )
-    if orientation is not None and not (len(orientation) == 3 and sum(x * x for x in orientation) > 0):
-        raise InvalidValueError(
-            f"Expected orientation to be a direction of three numbers, got {orientation}. Write (1.0, 0.0, 0.0).",
-            field="orientation",
-        )
+    axis = None if orientation is None else _axis(orientation)
     stem = re.sub(r"\W+", "_", Path(path).stem, flags=re.ASCII) if path is not None else "brdf"
     name = stem if re.match(r"[A-Za-z]", stem) else f"brdf_{stem}"
-    made = exporter.write(material, name, orientation)
+    made = exporter.write(material, name, axis)
     if path is None:
         return made
     Path(path).write_bytes(made.to_bytes())
     return replace(made, path=Path(path))
+
+
+def _axis(given: Orientation) -> Orientation:
+    """The direction as three floats; InvalidValueError where it is none."""
+    try:
+        x, y, z = (float(component) for component in given)
+    except (TypeError, ValueError):
+        x = y = z = math.nan
+    if not 0 < x * x + y * y + z * z < math.inf:
+        raise InvalidValueError(
+            f"Expected orientation to be a direction of three numbers, got {given}. Write (1.0, 0.0, 0.0).",
+            field="orientation",
+        )
+    return x, y, z

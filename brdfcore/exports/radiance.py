@@ -90,7 +90,7 @@ def _f(text: str, at: Nodes) -> Tensor:
     """The f [1/sr] at the nodes, (N, 3), of a written material, from its text."""
     numbers = [float(word) for word in re.sub(r"^#.*$", "", text, flags=re.MULTILINE).split() if _is_number(word)]
     with torch.no_grad():
-        if "WGMDfunc" in text:
+        if re.search(r"^void WGMDfunc ", text, re.MULTILINE):
             # 4 rs rs rs . 0 0 | 13 1 au av 0 0 0 ux uy uz 0 9 kd kd kd 0 0 0 0 0 0
             rs, (au, av), kd = numbers[1:4], numbers[8:10], numbers[18:21]
             made = material(f"lambert(kd={kd}) + ward_bounded(anisotropic, rs={rs}, ax={au!r}, ay={av!r})")

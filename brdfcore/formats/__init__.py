@@ -12,7 +12,7 @@ from typing import Final
 from ..errors import FormatError, unknown_name
 from . import alta, arrow, astm, cornell, curet, delimited, merl, nist, npy, npz, parquet, rgl
 from ._format import Format
-from ._text import number
+from ._text import brief, number
 from .delimited import write_csv
 from .samples import ANGLE_UNITS, QUANTITIES, Masked, Samples
 
@@ -104,14 +104,20 @@ def detect(head: bytes) -> str:
         raise FormatError(
             f"Expected the file to be of one format, got {' and '.join(names)}. Pass format.", field="format"
         )
-    known = "; ".join(f"{name} ({format_.description})" for name, format_ in FORMATS.items())
-    first = next((line for line in head.split(b"\n") if line.strip() and not line.lstrip().startswith(b"#")), b"")
-    text = first.decode("ascii", errors="replace").strip()
-    begins = f" It begins with {text[:60]!r}; for a table, format='csv' says what its header lacks."
-    if text and all(number(word) is not None for word in text.replace(",", " ").split()):
-        begins = f" It begins with the numbers {text[:60]!r}: for a table without a header row, pass columns."
     raise FormatError(
-        f"Expected the file to be of a known format, got none of them. Known: {known}."
-        + (begins if text.isprintable() else ""),
+        f"Expected the file to be of a known format, got {_beginning(head)} Known: {', '.join(FORMATS)}.",
         field="format",
     )
+
+
+def _beginning(head: bytes) -> str:
+    """What a file of no known format begins with, and what to do about it."""
+    first = next((line for line in head.split(b"\n") if line.strip() and not line.lstrip().startswith(b"#")), b"")
+    text = first.decode("utf-8-sig", errors="replace").strip()
+    if not text:
+        return "no line of data. Check that it is a measurement."
+    if "\ufffd" in text or not text.replace("\t", " ").isprintable():
+        return "unknown binary data. Check that it is a measurement."
+    if all(number(word) is not None for word in text.replace(",", " ").split()):
+        return f"the numbers {brief(text)} at its start. For a table without a header row, pass columns."
+    return f"{brief(text)} at its start. For a table, format='csv' says what its header lacks."

@@ -18,7 +18,6 @@ from ._header import header_of
 from ._text import brief
 from .samples import Samples
 
-MAX_NUMBERS = 2**28  # cells of a table: 2 GiB as float64
 _HOW = "Add it to the schema's metadata under this key, or pass it as an argument."
 
 
@@ -32,14 +31,6 @@ def pyarrow(module: str) -> Any:
             "Install it with: pip install 'brdfcore[arrow]'.",
             field="format",
         ) from error
-
-
-def check_numbers(count: int) -> None:
-    """Raise FormatError where a table, or what holds it, is of more numbers than the limit."""
-    if count > MAX_NUMBERS:
-        raise FormatError(
-            f"Expected a table of at most {MAX_NUMBERS:,} numbers, got {count:,}. Split it, or keep fewer samples."
-        )
 
 
 def check_schema(schema: Any) -> None:

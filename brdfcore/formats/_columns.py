@@ -12,7 +12,7 @@ from ._assemble import from_columns
 from ._checks import Where
 from ._declared import declared
 from ._header import ANGLES, VECTORS, Header, value_channels
-from ._text import brief
+from ._text import brief, brief_list
 from .samples import ANGLE_UNITS, QUANTITIES, Samples, SamplesKeywords
 
 DECLARATIONS = ("quantity", "angle_unit", "azimuth_observed")
@@ -41,14 +41,16 @@ def samples_of(
     """
     measured_quantity = declared("quantity", QUANTITIES, stated.get("quantity"), quantity, source.declare_quantity)
     units = {name: _unit(name, header, stated.get("angle_unit"), angle_unit, source) for name in header.units}
-    needed = [column for column in range(len(header.names)) if column not in header.values]
-    empty = np.isnan(rows[:, needed])
+    empty = np.isnan(rows)
+    measured = ~np.any(empty[:, header.values], axis=-1, keepdims=True)
+    empty[:, header.values] = False
+    empty[:, header.sigma] &= measured  # the row is masked, and its sigma with it
     if empty.any():
-        row, index = (int(k) for k in np.argwhere(empty)[0])
-        name = header.names[needed[index]]
+        row, column = (int(k) for k in np.argwhere(empty)[0])
+        name = header.names[column]
         raise FormatError(
             f"Expected {name} at {source.where(row)} to be a number, got an empty cell. "
-            "Fill it in or remove the row; only a value may be empty.",
+            "Fill it in or remove the row; only a value may be empty, and sigma with it.",
             field=name,
         )
     columns = {name: rows[:, column] for name, column in header.directions.items()}
@@ -76,9 +78,21 @@ def samples_of(
 
 def columns_of(samples: Samples) -> dict[str, torch.Tensor]:
     """The samples' exact numbers by column name, each (N,); FormatError for channels that would not read back."""
-    value_channels(samples.channels)
+    check_channels(samples.channels)
     columns = dict(zip(VECTORS, (*samples.wi.unbind(1), *samples.wo.unbind(1)), strict=True))
     return columns | value_columns(samples)
+
+
+def check_channels(channels: tuple[str, ...]) -> None:
+    """Raise FormatError where channels cannot be columns of a table, as their names would not read back."""
+    try:
+        value_channels(channels)
+    except FormatError as error:
+        raise FormatError(
+            "Expected channels to be value, or r, g, b, or wavelengths in nm for a table, "
+            f"got {brief_list(channels)}. Write an .npz, which takes any names.",
+            field="channels",
+        ) from error
 
 
 def value_columns(samples: Samples) -> dict[str, torch.Tensor]:

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FormatError
-from ._arrow import check_numbers, check_schema, guarded, pyarrow, samples_from_table, table_of
+from ._arrow import check_schema, guarded, pyarrow, samples_from_table, table_of
 from ._format import Format
+from ._size import check_numbers
 from .samples import Samples
 
 MAGIC = b"ARROW1"  # twice zero after it, to eight bytes

@@ -19,9 +19,9 @@ from pathlib import Path
 import torch
 
 from ..errors import FormatError
-from ._columns import DECLARATIONS, Source, samples_of, stated_of, value_columns
+from ._columns import DECLARATIONS, Source, check_channels, samples_of, stated_of, value_columns
 from ._format import Format
-from ._header import ANGLES, header_of, is_direction, split_header, value_channels
+from ._header import ANGLES, header_of, is_direction, split_header
 from ._table import line_of, parse_rows
 from ._text import brief, head_text, number, text_of
 from .samples import Samples, angles
@@ -91,7 +91,7 @@ def write_csv(samples: Samples, path: str | Path, comments: Mapping[str, str] | 
     themselves). `comments` become lines `# key: value` at the top. Raises FormatError for channels or comments that
     would not read back.
     """
-    value_channels(samples.channels)
+    check_channels(samples.channels)
     stated = stated_of(samples)
     for key, text in (comments or {}).items():
         if re.fullmatch(r"\w+", key) is None or key.lower() in DECLARATIONS or re.search(r"[\r\n]", text) is not None:

@@ -117,7 +117,8 @@ class Info:
             )
         for number, row in enumerate(self.reflectance):
             azimuth = f", phi_i {row.phi_i_deg:g}" if facts["azimuth_observed"] else ""
-            least, most, error = min(row.values), max(row.values), max(row.error)
+            least, most = (round(value, 3) + 0.0 for value in (min(row.values), max(row.values)))  # + 0.0: no -0.000
+            error = max(row.error)
             span = f"{least:.3f}" if len(row.values) == 1 else f"{least:.3f} to {most:.3f}"
             line = f"theta_i {row.theta_i_deg:g}{azimuth}: {span}, estimated error {error:.1g}"
             lines.append(("reflectance" if number == 0 else "", line))

@@ -17,6 +17,7 @@ from ._checks import default_where
 from ._columns import Source, samples_of
 from ._format import Format
 from ._header import header_of
+from ._size import check_numbers
 from ._text import brief
 from .samples import Samples
 
@@ -82,6 +83,7 @@ def _load(path: Path) -> "np.ndarray[tuple[int], np.dtype[np.void]]":
                 f"{brief(str(dtype[wrong[0]]))[1:-1]}. Save it as float64.",
                 field=wrong[0][:40],
             )
+        check_numbers(shape[0] * len(dtype.names))
         claimed, held = math.prod(shape) * dtype.itemsize, path.stat().st_size - file.tell()
         if claimed != held:
             raise FormatError(

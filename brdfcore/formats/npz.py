@@ -26,12 +26,14 @@ from ._columns import TRUTH, stated_of
 from ._declared import declared
 from ._format import Format
 from ._header import ANGLES
+from ._size import check_numbers
 from ._text import brief
 from .samples import ANGLE_UNITS, QUANTITIES, Samples, SamplesKeywords
 
 MAX_UNCOMPRESSED_BYTES = 2 * 2**30  # of all arrays together
 _WORDS = ("quantity", "angle_unit", "azimuth_observed")
 _TEXTS = (*_WORDS, "channels")
+_MOST_WORDS = 10_000  # channels; a spectrometer has some hundreds
 _NUMBERS = ("wi", "wo", *ANGLES, "values", "sigma", "weight", "cell")
 _HOW = "Add it to the archive under this key, or pass it as an argument."
 
@@ -111,6 +113,7 @@ def _unpack(path: Path) -> dict[str, Array]:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
             _check_directory([member.filename for member in members], sum(member.file_size for member in members))
+            check_numbers(sum(_count(archive, member) for member in members))
             return {member.filename.removesuffix(".npy"): _load(archive, member) for member in members}
     except BrdfError:
         raise
@@ -143,8 +146,8 @@ def _check_directory(names: list[str], size: int) -> None:
         )
 
 
-def _load(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Array:
-    """One array, after its header has been found to fit the member's size."""
+def _count(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> int:
+    """How many numbers an array holds, after its header has been found to fit the member's size."""
     name = member.filename.removesuffix(".npy")
     with archive.open(member) as file:
         version = np.lib.format.read_magic(file)
@@ -164,6 +167,17 @@ def _load(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Array:
                 f"(shape {shape}, {dtype}), got {held:,}. The file is damaged: save it again.",
                 field=name,
             )
+    count = math.prod(shape)
+    if name in _TEXTS and count > _MOST_WORDS:
+        raise FormatError(
+            f"Expected {name} to be at most {_MOST_WORDS:,} words, got {count:,}. Save one name a channel.", field=name
+        )
+    return 0 if name in _TEXTS else count
+
+
+def _load(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Array:
+    """One array whose header has been checked."""
+    name = member.filename.removesuffix(".npy")
     with archive.open(member) as file:
         array: Array = np.lib.format.read_array(file, allow_pickle=False)
     if name in _WORDS and array.size != 1:

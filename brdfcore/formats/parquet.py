@@ -11,8 +11,9 @@ types of the columns with it. Needs the extra `arrow`.
 from pathlib import Path
 
 from ..errors import FormatError
-from ._arrow import check_numbers, check_schema, guarded, pyarrow, samples_from_table, table_of
+from ._arrow import check_schema, guarded, pyarrow, samples_from_table, table_of
 from ._format import Format
+from ._size import check_numbers
 from .samples import Samples
 
 MAGIC = b"PAR1"

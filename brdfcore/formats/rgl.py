@@ -28,6 +28,7 @@ import numpy.typing as npt
 from ..errors import FormatError
 from ._declared import declared
 from ._format import Format
+from ._size import check_numbers
 from ._tensors import MAGIC, tensors
 from ._warp import Corners, Table, Warp
 from .samples import QUANTITIES, Masked, Samples
@@ -176,6 +177,7 @@ def load(path: Path) -> Rgl:
     arrays: dict[str, Array] = {}
     spectral = "spectra" in found
     colour = {"spectra": 5, "wavelengths": 1} if spectral else {"rgb": 5}
+    check_numbers(sum(found[name].size for name in _FIELDS | colour if name in found))
     for name, dimensions in (_FIELDS | colour).items():
         if name not in found:
             raise FormatError(f"Expected the .bsdf file to hold {name!r}, got none. It is no file of the RGL database.")

@@ -3,6 +3,8 @@
 from ._figure import kind_of, save, to_bytes
 from .albedo import albedo
 from .comparison import comparison
+from .contours import contours
+from .differences import differences
 from .directions import directions
 from .lobes import check_scale, lobes
 from .residuals import residuals, residuals_of
@@ -11,6 +13,8 @@ __all__ = [
     "albedo",
     "check_scale",
     "comparison",
+    "contours",
+    "differences",
     "directions",
     "kind_of",
     "lobes",

@@ -8,13 +8,16 @@ Spheres, planes and rectangles with the library's own materials, and lights with
 meshes, and the frame rates of a graphics card.
 """
 
+from .camera import Camera
+from .colours import to_rgb
 from .effects import Effect, Plan
-from .image import Image
+from .image import Image, psnr
 from .lights import Directional, Dome, Point, RectangleLight, SphereLight
 from .plan import everything, plan
 from .progressive import render
-from .scene import LIGHTS, SCENES, SHAPES, Camera, Scene
+from .scene import LIGHTS, SCENES, SHAPES, Scene
 from .shapes import Plane, Rectangle, Sphere
+from .sphere import lit_sphere
 
 __all__ = [
     "LIGHTS",
@@ -34,6 +37,9 @@ __all__ = [
     "Sphere",
     "SphereLight",
     "everything",
+    "lit_sphere",
     "plan",
+    "psnr",
     "render",
+    "to_rgb",
 ]

@@ -10,6 +10,7 @@ from torch import Tensor
 from ..errors import BrdfError, InvalidValueError
 
 Vector = tuple[float, float, float]
+LARGEST = 1e60  # of any length or strength: squares and their products stay finite
 Colour = float | Sequence[float] | Tensor  # one number, or red, green and blue
 
 
@@ -18,7 +19,8 @@ def vector(name: str, value: object) -> Vector:
     if isinstance(value, list | tuple) and len(value) == 3 and all(map(_finite, value)):
         return (float(value[0]), float(value[1]), float(value[2]))
     raise InvalidValueError(
-        f"Expected {name} to be three finite numbers, got {value!r}. Write it as [x, y, z].", field=name
+        f"Expected {name} to be three finite numbers, got {value!r}. Write it as [x, y, z], none beyond {LARGEST:g}.",
+        field=name,
     )
 
 
@@ -38,7 +40,8 @@ def positive(name: str, value: object) -> float:
     if _finite(value) and value > 0:  # type: ignore[operator]
         return float(value)  # type: ignore[arg-type]
     raise InvalidValueError(
-        f"Expected {name} to be a finite number above 0, got {value!r}. Give it a size.", field=name
+        f"Expected {name} to be a finite number above 0, got {value!r}. Give it a size, up to {LARGEST:g}.",
+        field=name,
     )
 
 
@@ -51,6 +54,21 @@ def whole(name: str, value: object, lowest: int, highest: int) -> int:
     )
 
 
+def device(value: torch.device | str) -> torch.device:
+    """The processor or a graphics card that is there, or an error."""
+    try:
+        found = torch.device(value)
+    except RuntimeError:
+        found = None
+    cards = torch.cuda.device_count() if found is not None and found.type == "cuda" else 0
+    if found is None or not (found.type == "cpu" or (found.index or 0) < cards):
+        raise InvalidValueError(
+            f"Expected device to be cpu, or cuda where torch finds such a card, got {str(value)!r}. Choose another.",
+            field="device",
+        )
+    return found
+
+
 def colour(name: str, value: object) -> Colour:
     """A number that is not negative, or three, or a tensor of either, which may be differentiated."""
     if isinstance(value, Tensor):
@@ -61,7 +79,7 @@ def colour(name: str, value: object) -> Colour:
         return value  # type: ignore[return-value]
     raise InvalidValueError(
         f"Expected {name} to be one number or three, finite and not negative, got {value!r}. "
-        "Give red, green and blue, or one number.",
+        f"Give red, green and blue, or one number, up to {LARGEST:g}.",
         field=name,
     )
 
@@ -90,4 +108,4 @@ def located(error: BrdfError, where: str) -> BrdfError:
 
 
 def _finite(x: object) -> bool:
-    return isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x)
+    return isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST  # nan is not

@@ -13,19 +13,15 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from ..energy import of_form
-from ..energy.probe import symmetry
 from .lights import AreaLight, DeltaLight, Directional, RectangleLight, SphereLight
 from .lights import Point as PointLight
+from .measured import AnySurface
 from .scene import Scene
-from .surfaces import Surface
 from .trace import Vertices, arrive, nearest
 
-ANGLES, AZIMUTHS = 17, 5  # at which albedos are looked at; they change slowly
+ANGLES = 17  # at which albedos are looked at; they change slowly
 GRAZING = math.radians(89.99)
 FIRST = 256  # points at which a part is looked at first: one that shows there is not looked at elsewhere
-FLATTEST = 28 / (23 * math.pi)  # the largest f [1/sr] of a diffuse term of reflectance 1: Ashikhmin and Shirley's
-DIFFUSE = ("lambert", "coupled_lambert", "ashikhmin_shirley_diffuse")
 TILE = 2**16
 ROUGH = 1e-2  # tolerance of albedos where two digits are enough
 
@@ -34,7 +30,7 @@ ROUGH = 1e-2  # tolerance of albedos where two digits are enough
 class Seen:
     """What the camera sees of one material."""
 
-    vertices: Vertices
+    vertices: Vertices | None  # None where no light without extent asks for them
     farthest: float  # from the normal, of the directions of view [rad]
 
 
@@ -42,6 +38,8 @@ def seen(scene: Scene, surface_of: Sequence[int], count: int) -> list[Seen]:
     """The visible points of each material, one for each ray of the camera."""
     rays = scene.camera.rays().reshape(-1, 3)
     found: list[list[Vertices]] = [[] for _ in range(count)]
+    lowest = [1.0] * count
+    wanted = any(isinstance(light, DeltaLight) for light in scene.lights)
     index = torch.tensor(surface_of)
     for direction in rays.split(TILE):
         origin = direction.new_tensor(scene.camera.position).expand_as(direction)
@@ -51,18 +49,17 @@ def seen(scene: Scene, surface_of: Sequence[int], count: int) -> list[Seen]:
         vertices = arrive(scene.objects, shape[rows], point, direction[rows])
         for number in range(count):
             front = (vertices.wo[:, 2] > 0) & (index[vertices.shape] == number)
-            found[number].append(vertices.take(torch.nonzero(front).squeeze(-1)))
-    return [_together(parts) for parts in found]
+            if bool(front.any()):
+                lowest[number] = min(lowest[number], float(vertices.wo[front, 2].min()))
+                if wanted:
+                    found[number].append(vertices.take(torch.nonzero(front).squeeze(-1)))
+    return [Seen(_together(parts) if parts else None, math.acos(low)) for parts, low in zip(found, lowest, strict=True)]
 
 
-def _together(parts: list[Vertices]) -> Seen:
+def _together(parts: list[Vertices]) -> Vertices:
     x, y, z = (torch.cat([part.axes[k] for part in parts]) for k in range(3))
-    wo = torch.cat([part.wo for part in parts])
-    vertices = Vertices(
-        torch.cat([part.point for part in parts]), torch.cat([part.shape for part in parts]), (x, y, z), wo
-    )
-    lowest = float(wo[:, 2].min().clamp(max=1)) if len(wo) else 1.0
-    return Seen(vertices, math.acos(lowest))
+    point, shape, wo = (torch.cat([getattr(part, name) for part in parts]) for name in ("point", "shape", "wo"))
+    return Vertices(point, shape, (x, y, z), wo)
 
 
 def lamps(scene: Scene) -> list[tuple[float, float]]:
@@ -101,7 +98,7 @@ def irradiance(scene: Scene) -> float:
     return total
 
 
-def largest_albedo(surface: Surface, farthest: float = GRAZING, tolerance: float = ROUGH / 10) -> float:
+def largest_albedo(surface: AnySurface, farthest: float = GRAZING, tolerance: float = ROUGH / 10) -> float:
     """The largest albedo [1] over directions of view up to an angle from the normal, with the error claimed."""
     return _largest(_albedos(surface, farthest, tolerance))
 
@@ -112,31 +109,23 @@ def _largest(albedos: Tensor) -> float:
     return float(albedos.max() + bend)
 
 
-def _albedos(surface: Surface, farthest: float, tolerance: float) -> Tensor:
-    """Albedos, (ANGLES, AZIMUTHS or 1, C or 1)."""
-    if surface.black:
-        return torch.zeros(1, 1, 1, dtype=torch.float64)
+def _albedos(surface: AnySurface, farthest: float, tolerance: float) -> Tensor:
+    """Albedos, (ANGLES, azimuths, C or 1)."""
     t = torch.linspace(0, 1, ANGLES, dtype=torch.float64)
-    theta = farthest * (1 - (1 - t).square())  # closer where albedos change more
-    with torch.no_grad():
-        values = surface.values(theta)
-        azimuths = 1 if symmetry(surface.form, values).isotropic else AZIMUTHS
-        phi = torch.linspace(0, torch.pi / 2, azimuths, dtype=torch.float64)
-        found = of_form(surface.form, values, torch.cos(theta)[:, None], phi, tolerance)
-    return found.values + found.error.nan_to_num(posinf=0.0)
+    return surface.albedos(farthest * (1 - (1 - t).square()), tolerance)  # closer where albedos change more
 
 
-def lost_albedo(whole: Surface, less: Surface, farthest: float, tolerance: float) -> float:
+def lost_albedo(whole: AnySurface, less: AnySurface, farthest: float, tolerance: float) -> float:
     """The largest albedo [1] that a surface loses by what `less` leaves out."""
     rest = _albedos(less, farthest, tolerance)
     return _largest((_albedos(whole, farthest, tolerance) - rest).abs()) + tolerance
 
 
-def lost_highlight(scene: Scene, whole: Surface, less: Surface, where: Vertices, enough: float) -> float:
+def lost_highlight(scene: Scene, whole: AnySurface, less: AnySurface, where: Vertices | None, enough: float) -> float:
     """The largest loss [radiance] under the lights without extent at visible points, or at least `enough`."""
-    lights = [light for light in scene.lights if isinstance(light, DeltaLight)]
-    if not lights or not len(where):
+    if where is None:
         return 0.0
+    lights = [light for light in scene.lights if isinstance(light, DeltaLight)]
     spread = torch.linspace(0, len(where) - 1, min(FIRST, len(where))).long()
     largest = _highlight(lights, whole, less, where.take(spread))
     if largest > enough or len(where) <= FIRST:
@@ -145,7 +134,7 @@ def lost_highlight(scene: Scene, whole: Surface, less: Surface, where: Vertices,
     return max(_highlight(lights, whole, less, where.take(part)) for part in rows)
 
 
-def _highlight(lights: Sequence[DeltaLight], whole: Surface, less: Surface, where: Vertices) -> float:
+def _highlight(lights: Sequence[DeltaLight], whole: AnySurface, less: AnySurface, where: Vertices) -> float:
     total = where.point.new_zeros(len(where), 1)
     with torch.no_grad():
         for light in lights:
@@ -154,18 +143,3 @@ def _highlight(lights: Sequence[DeltaLight], whole: Surface, less: Surface, wher
             lost = (whole.reflected(local, where.wo) - less.reflected(local, where.wo)).abs()
             total = total + lost * strength.unsqueeze(-1) * light.colour(strength)
     return float(total.max())
-
-
-def diffuse_peak(surface: Surface) -> float:
-    """The largest f cos theta_i [1/sr] over all directions of a surface of diffuse terms; inf where it has a lobe."""
-    values = surface.values(torch.zeros((), dtype=torch.float64))
-    total = 0.0
-    for term in surface.form.terms:
-        coefficients = term.model.coefficients(surface.form.of_term(term, values))
-        largest = max(float(c.detach().max()) for c in coefficients)
-        if largest == 0:
-            continue
-        if term.model.name not in DIFFUSE:
-            return math.inf
-        total += FLATTEST * largest
-    return total

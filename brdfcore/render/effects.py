@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
+from .measured import AnySurface
 from .scene import Scene
-from .surfaces import Surface
 
 CLOSED_FORM = "closed form"
 LOOK_UP = "albedo look-up"
@@ -34,7 +35,7 @@ class Plan:
     scene: Scene
     tolerance: float  # [radiance]
     effects: tuple[Effect, ...]
-    surfaces: tuple[Surface, ...]  # one a material
+    surfaces: tuple[AnySurface, ...]  # one a material
     surface_of: tuple[int, ...]  # of each object
     depth: int  # interreflections
     albedo_tolerance: float
@@ -66,6 +67,16 @@ class Plan:
         """Term evaluations and ray tests of the image, predicted."""
         return sum(effect.cost for effect in self.effects if effect.on)
 
+    def to_dict(self) -> dict[str, Any]:
+        """The table as JSON-able data; None where nothing bounds an error."""
+        return {
+            "effects": [{**vars(effect), "error": _finite(effect.error)} for effect in self.effects],
+            "tolerance": self.tolerance,
+            "error": _finite(self.error),
+            "met": self.met,
+            "cost": self.cost,
+        }
+
     def _told(self) -> list[Effect]:
         """The rows of the table: interreflections that are on are one."""
         on = [e for e in self.effects if e.on and e.name.startswith(INTERREFLECTION)]
@@ -87,3 +98,7 @@ class Plan:
         met = "within" if self.met else "NOT within"
         bound = "unbounded" if math.isinf(self.error) else f"{self.error:.1e}"
         return "\n".join([*lines, f"left out: at most {bound}, {met} the tolerance {self.tolerance:g}"])
+
+
+def _finite(x: float) -> float | None:
+    return x if math.isfinite(x) else None

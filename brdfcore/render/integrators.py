@@ -96,7 +96,7 @@ class Integrator:
             if by_light:
                 gathered = gathered + self._light_samples(vertices, uniform)
             if by_material or bounce < depth:
-                wi = self._grouped(Surface.sample, vertices, vertices.wo, uniform(len(vertices), 3))
+                wi = self._drawn(vertices, uniform(len(vertices), 3))
                 density = self._pdf(vertices, wi)
                 reflected = self._reflected(vertices, wi)
                 empty = (density == 0).unsqueeze(-1)
@@ -116,7 +116,7 @@ class Integrator:
             total = total.index_add(0, path, (weight * gathered).expand(len(path), scene.channels))
             if bounce < depth:
                 assert t is not None and shape is not None  # noqa: S101, PT018 - for mypy: a further bounce traces
-                goes = torch.nonzero((shape >= 0) & (ratio.detach() > 0).any(-1)).squeeze(-1)
+                goes = torch.nonzero((shape >= 0) & (ratio.detach() != 0).any(-1)).squeeze(-1)
                 path, weight = path[goes], (weight * ratio)[goes]
                 point = vertices.point[goes] + t[goes].unsqueeze(-1) * towards[goes]
                 vertices = arrive(scene.objects, shape[goes], point, towards[goes])
@@ -148,6 +148,7 @@ class Integrator:
     def _albedo(self, vertices: Vertices) -> Tensor:
         """The directional albedo at each vertex, (N, C), differentiable where gradients are asked for."""
         (surface,) = self.plan.surfaces
+        assert isinstance(surface, Surface)  # noqa: S101 - the plan looks nothing up for a table
         cosine = vertices.wo[:, 2].clamp(max=1)
         azimuth = torch.atan2(vertices.wo[:, 1], vertices.wo[:, 0])
         if surface.black or not len(vertices):
@@ -161,15 +162,18 @@ class Integrator:
         return table(theta, azimuth).to(cosine)
 
     def _reflected(self, vertices: Vertices, wi: Tensor) -> Tensor:
-        return self._grouped(Surface.reflected, vertices, wi, vertices.wo)
+        return self._grouped(lambda surface, *rows: surface.reflected(*rows), vertices, wi, vertices.wo)
 
     def _pdf(self, vertices: Vertices, wi: Tensor) -> Tensor:
-        return self._grouped(Surface.pdf, vertices, wi, vertices.wo)
+        return self._grouped(lambda surface, *rows: surface.pdf(*rows), vertices, wi, vertices.wo)
 
-    def _grouped(self, method: Callable[..., Tensor], vertices: Vertices, *tensors: Tensor) -> Tensor:
+    def _drawn(self, vertices: Vertices, u: Tensor) -> Tensor:
+        return self._grouped(lambda surface, *rows: surface.sample(*rows), vertices, vertices.wo, u)
+
+    def _grouped(self, compute: Callable[..., Tensor], vertices: Vertices, *tensors: Tensor) -> Tensor:
         surfaces = self.plan.surfaces
         index = self._surface_of.to(vertices.shape.device)[vertices.shape] if len(surfaces) > 1 else vertices.shape
-        return grouped(index, len(surfaces), lambda number, *rows: method(surfaces[number], *rows), *tensors)
+        return grouped(index, len(surfaces), lambda number, *rows: compute(surfaces[number], *rows), *tensors)
 
 
 def power_heuristic(own: Tensor, other: Tensor) -> Tensor:

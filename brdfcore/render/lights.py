@@ -16,7 +16,7 @@ from torch import Tensor
 
 from . import _checks
 from ._checks import Colour, Vector
-from .shapes import check_rectangle, cross, perpendicular, rectangle_distance, sphere_distance
+from .shapes import check_rectangle, cross, inner, perpendicular, rectangle_distance, sphere_distance
 
 
 class Light(ABC):
@@ -126,12 +126,12 @@ class RectangleLight(AreaLight):
     def seen(self, origin: Tensor, direction: Tensor) -> Tensor:
         """From the front only."""
         t = rectangle_distance(origin, direction, self.center, self.edge_u, self.edge_v)
-        facing = (direction * origin.new_tensor(cross(self.edge_u, self.edge_v))).sum(-1) < 0
+        facing = inner(direction, origin.new_tensor(cross(self.edge_u, self.edge_v))) < 0
         return torch.where(facing, t, torch.inf)
 
     def _density(self, wi: Tensor, distance: Tensor) -> Tensor:
         """The density distance^2 / (area cosine) [1/sr]."""
-        cosine = -(wi * wi.new_tensor(cross(self.edge_u, self.edge_v))).sum(-1)
+        cosine = -inner(wi, wi.new_tensor(cross(self.edge_u, self.edge_v)))
         area = math.hypot(*self.edge_u) * math.hypot(*self.edge_v)
         return torch.where(cosine > 0, distance.square() / (area * torch.where(cosine > 0, cosine, 1.0)), 0.0)
 
@@ -164,7 +164,7 @@ class SphereLight(AreaLight):
         assert isinstance(wi, Tensor)  # noqa: S101 - for mypy: sum may return 0
         # a direction at the cone's rim may miss by rounding: it is as far as the rim
         t = self.seen(point, wi)
-        rim = torch.sqrt((to_center.square().sum(-1) - self.radius**2).clamp(min=0))
+        rim = torch.sqrt((inner(to_center, to_center) - self.radius**2).clamp(min=0))
         return wi, torch.where(t.isinf(), rim, t), 1 / (2 * math.pi * height)
 
     def met(self, point: Tensor, normal: Tensor, direction: Tensor) -> tuple[Tensor, Tensor]:
@@ -178,7 +178,8 @@ class SphereLight(AreaLight):
 
     def _height(self, point: Tensor) -> Tensor:
         """The height 1 - cos of the cone, 2 from inside the sphere."""
-        d2 = (point.new_tensor(self.center) - point).square().sum(-1)
+        to_center = point.new_tensor(self.center) - point
+        d2 = inner(to_center, to_center)
         sine2 = (self.radius**2 / d2).clamp(max=1)
         return torch.where(sine2 < 1, sine2 / (1 + torch.sqrt(1 - sine2)), 2.0)
 
@@ -203,7 +204,7 @@ class Dome(AreaLight):
 
     def met(self, point: Tensor, normal: Tensor, direction: Tensor) -> tuple[Tensor, Tensor]:
         """Every ray does, beyond everything."""
-        cosine = (direction * normal).sum(-1)
+        cosine = inner(direction, normal)
         return self.seen(point, direction), cosine.clamp(min=0) / math.pi
 
     def seen(self, origin: Tensor, direction: Tensor) -> Tensor:

@@ -12,7 +12,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ..errors import InvalidValueError, unknown_name
-from . import contributions
+from ..tabulated import Tabulated
+from . import _checks, contributions
 from .effects import (
     BRDF_SAMPLING,
     CLOSED_FORM,
@@ -25,6 +26,7 @@ from .effects import (
     Plan,
 )
 from .lights import AreaLight, DeltaLight, Dome
+from .measured import AnySurface, Measured, surface
 from .scene import Scene
 from .surfaces import Surface
 from .terms import Lighting, decide
@@ -38,7 +40,7 @@ def plan(
     """The plan of a scene, whose image differs from that of everything by at most the tolerance [radiance].
 
     force    effect's name -> on or off, whatever the bounds say; "interreflection 2" off ends paths after one bounce
-    bounces  the most interreflections that are thought of
+    bounces  the most interreflections that are thought of, up to 1024
     Raises InvalidValueError for a tolerance below 0 and where nothing is left to sample a light with, and
     UnknownNameError for an effect that the scene does not have.
     """
@@ -46,12 +48,13 @@ def plan(
         raise InvalidValueError(
             f"Expected tolerance to be a finite number from 0, got {tolerance:g}. It is a radiance.", field="tolerance"
         )
+    _checks.whole("bounces", bounces, 0, 1024)
     forced = dict(force or {})
     lone = len(scene.objects) == 1
     materials = list({id(shape.material): shape.material for shape in scene.objects}.values())
     place = {id(material): number for number, material in enumerate(materials)}
     surface_of = tuple(place[id(shape.material)] for shape in scene.objects)
-    surfaces = [Surface(material) for material in materials]
+    surfaces = [surface(material) for material in materials]
     light = _light(scene, surfaces, lone)
     interreflections = _bounces(scene, light, lone, tolerance, forced, bounces)
     depth = sum(effect.on for effect in interreflections)
@@ -64,7 +67,9 @@ def plan(
             raise unknown_name("an effect", name, [effect.name for effect in effects], field="force")
     on = {effect.name for effect in effects if effect.on}
     if WEIGHTS not in on:
-        surfaces = [replace(surface, uniform_weights=True) for surface in surfaces]
+        surfaces = [replace(analytic, uniform_weights=True) for analytic in _analytic(surfaces, WEIGHTS, "on")]
+    if LOOK_UP in on:
+        _analytic(surfaces, LOOK_UP, "off")
     sampled = [a for a in scene.lights if isinstance(a, AreaLight) and not (isinstance(a, Dome) and LOOK_UP in on)]
     if sampled and not {LIGHT_SAMPLING, BRDF_SAMPLING} & on:
         raise InvalidValueError(
@@ -83,10 +88,21 @@ def everything(scene: Scene, bounces: int = 8) -> Plan:
     return plan(scene, 0.0, force, bounces)
 
 
-def _light(scene: Scene, surfaces: list[Surface], lone: bool) -> Lighting:
+def _analytic(surfaces: list[AnySurface], name: str, due: str) -> list[Surface]:
+    """The surfaces, where none is a table; an effect that a table does not have is told."""
+    found = [surface for surface in surfaces if isinstance(surface, Surface)]
+    if len(found) < len(surfaces):
+        raise InvalidValueError(
+            f"Expected {name} to be {due} where a material is measured, got it forced. A table is only sampled.",
+            field="force",
+        )
+    return found
+
+
+def _light(scene: Scene, surfaces: list[AnySurface], lone: bool) -> Lighting:
     irradiance = contributions.irradiance(scene)
     albedo = 0.0 if lone else max(contributions.largest_albedo(surface) for surface in surfaces)
-    peak = max(contributions.diffuse_peak(surface) for surface in surfaces)
+    peak = max(surface.peak for surface in surfaces)
     in_mean = irradiance > 0 and math.isinf(peak)
     from_points = albedo * irradiance / math.pi if in_mean else (peak * irradiance if irradiance else 0.0)
     light = Lighting(tuple(contributions.lamps(scene)), irradiance, albedo, from_points, in_mean)
@@ -98,13 +114,14 @@ def _bounces(
 ) -> list[Effect]:
     """The interreflections: those that are on, and the first that is not, which stands for all beyond it."""
     effects: list[Effect] = []
+    measured = any(isinstance(shape.material, Tabulated) for shape in scene.objects)
     for number in range(1, bounces + 2):
         name = f"{INTERREFLECTION} {number}"
         if lone:
             tail, reason = 0.0, "one convex object does not light itself"
         elif light.albedo < 1:
             tail = light.albedo**number * light.direct / (1 - light.albedo)
-            reason = f"largest albedo {light.albedo:.3g}"
+            reason = f"largest albedo {light.albedo:.3g}" + (", estimated for a table" if measured else "")
             if light.in_mean:
                 reason += "; in the mean, caustics have no bound"
         else:
@@ -118,15 +135,17 @@ def _bounces(
     return effects
 
 
-def _sampling(scene: Scene, surfaces: list[Surface], lone: bool, forced: Mapping[str, bool]) -> list[Effect]:
+def _sampling(scene: Scene, surfaces: list[AnySurface], lone: bool, forced: Mapping[str, bool]) -> list[Effect]:
     """How light is gathered."""
     points = any(isinstance(a, DeltaLight) for a in scene.lights)
     dome = any(isinstance(a, Dome) for a in scene.lights)
     extended = any(isinstance(a, AreaLight) and not isinstance(a, Dome) for a in scene.lights)
-    lobes = any(term.model.name not in contributions.DIFFUSE for surface in surfaces for term in surface.form.terms)
+    lobes = any(math.isinf(surface.peak) for surface in surfaces)
+    measured = any(isinstance(surface, Measured) for surface in surfaces)
     right = forced.get(WEIGHTS, True)
-    look_up = forced.get(LOOK_UP, dome and lone and right)
+    look_up = forced.get(LOOK_UP, dome and lone and right and not measured)
     sampled_dome = dome and not look_up
+    even = "even light on one convex object"
     effects = [
         (
             CLOSED_FORM,
@@ -137,7 +156,7 @@ def _sampling(scene: Scene, surfaces: list[Surface], lone: bool, forced: Mapping
         (
             LOOK_UP,
             look_up,
-            "even light on one convex object" if look_up else "no even light on one convex object",
+            even if look_up else "a table is only sampled" if dome and lone and measured else f"no {even}",
             0.0,
         ),
         (
@@ -167,12 +186,12 @@ def _sampling(scene: Scene, surfaces: list[Surface], lone: bool, forced: Mapping
     ]
 
 
-def _costed(effects: list[Effect], scene: Scene, surfaces: list[Surface], depth: int) -> list[Effect]:
+def _costed(effects: list[Effect], scene: Scene, surfaces: list[AnySurface], depth: int) -> list[Effect]:
     """The effects with the term evaluations and ray tests that they take, over all rays and samples."""
     rays = scene.camera.width * scene.camera.height * scene.camera.grid**2
     samples = max(2, math.ceil(scene.samples / scene.camera.grid**2))
     paths = rays * samples
-    terms = sum(len(surface.form.terms) for surface in surfaces if not surface.black) / len(surfaces)
+    terms = sum(surface.count for surface in surfaces) / len(surfaces)
     delta = sum(isinstance(a, DeltaLight) for a in scene.lights)
     area = len(scene.lights) - delta
     on = {effect.name for effect in effects if effect.on}

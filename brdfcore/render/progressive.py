@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from ..errors import InvalidValueError
+from . import _checks
 from .effects import Plan
 from .image import Image
 from .integrators import Integrator
@@ -35,8 +36,11 @@ def render(
     gradient   keep the graph, to differentiate the pixels by the materials' parameters and by lights' strengths that
                are tensors; what the plan has off has no derivative. Pass `everything(scene)` to have all.
     progress   is called with the share that is done, from 0 to 1
-    Raises InvalidValueError for a plan of another scene.
+    Raises InvalidValueError for a plan of another scene, a seed that is no whole number from 0, and a device that is
+    not there.
     """
+    place = _checks.device(device)
+    _checks.whole("seed", seed, 0, 2**63 - 1)
     start = time.perf_counter()
     chosen = make_plan(scene, tolerance) if plan is None else plan
     if chosen.scene is not scene:
@@ -44,7 +48,7 @@ def render(
             "Expected plan to be of this scene, got one of another. Plan this one, or leave the plan out.", field="plan"
         )
     with torch.set_grad_enabled(gradient):
-        mean, variance, samples = _passes(chosen, seed, torch.device(device), progress or (lambda share: None))
+        mean, variance, samples = _passes(chosen, seed, place, progress or (lambda share: None))
     height, width, n2 = scene.camera.height, scene.camera.width, scene.camera.grid**2
     pixels = mean.reshape(height, width, n2, -1).mean(2).expand(height, width, 3)
     noise = torch.sqrt(variance.reshape(height, width, n2, -1).sum(2)) / n2

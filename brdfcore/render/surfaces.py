@@ -11,13 +11,16 @@ Uniform weights are what renderers used before Walter 2005: a sample of a term c
 mean is that of the f above, whatever f is.
 """
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import torch
 from torch import Tensor
 
+from ..energy import of_form
+from ..energy.probe import symmetry
 from ..geometry import geometry
 from ..models import Model
 from ..models.form import Form, Term
@@ -25,6 +28,9 @@ from ..models.material import Material
 
 # the word of an option that computes more, and the one that takes its place
 LESS = {"anisotropic": "isotropic", "schlick": "constant", "scaled": "constant", "compensated": "single"}
+AZIMUTHS = 5  # at which anisotropic albedos are looked at; they change slowly
+FLATTEST = 28 / (23 * math.pi)  # the largest f [1/sr] of a diffuse term of reflectance 1: Ashikhmin and Shirley's
+DIFFUSE = ("lambert", "coupled_lambert", "ashikhmin_shirley_diffuse")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +63,41 @@ class Surface:
     def black(self) -> bool:
         """Whether no term is left."""
         return len(self.dropped) == len(self.material.form.terms)
+
+    @property
+    def count(self) -> int:
+        """How many terms are evaluated."""
+        return len(self.form.terms)
+
+    @property
+    def peak(self) -> float:
+        """The largest f cos theta_i [1/sr] over all directions of diffuse terms; inf where there is a lobe."""
+        values = self.values(torch.zeros((), dtype=torch.float64))
+        total = 0.0
+        for term in self.form.terms:
+            coefficients = term.model.coefficients(self.form.of_term(term, values))
+            largest = max(float(c.detach().max()) for c in coefficients)
+            if largest == 0:
+                continue
+            if term.model.name not in DIFFUSE:
+                return math.inf
+            total += FLATTEST * largest
+        return total
+
+    def without(self, label: str) -> "Surface":
+        """The surface without a term."""
+        return replace(self, dropped=self.dropped | {label})
+
+    def albedos(self, theta: Tensor, tolerance: float) -> Tensor:
+        """Albedos [1] with the error claimed for them, (angles, azimuths, C), for theta [rad]."""
+        if self.black:
+            return torch.zeros(1, 1, 1, dtype=torch.float64)
+        with torch.no_grad():
+            values = self.values(theta)
+            azimuths = 1 if symmetry(self.form, values).isotropic else AZIMUTHS
+            phi = torch.linspace(0, torch.pi / 2, azimuths, dtype=torch.float64)
+            found = of_form(self.form, values, torch.cos(theta)[:, None], phi, tolerance)
+        return found.values + found.error.nan_to_num(posinf=0.0)
 
     def frozen(self) -> Material:
         """The kept terms as a material of its own, without derivatives."""

@@ -10,10 +10,12 @@ from ..models.base import Model
 from ..parameters import Values
 from . import contributions
 from .effects import Effect
+from .measured import LABEL, AnySurface, Measured
 from .scene import Scene
-from .surfaces import Surface, replaceable, widths
+from .surfaces import replaceable, widths
 
 OPTION_NAMES = {"anisotropic": "anisotropy", "schlick": "fresnel", "scaled": "fresnel", "compensated": "compensation"}
+ESTIMATED = "a table; of lights with an extent its part is estimated by samples, not bounded"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +51,22 @@ class _Row:
 
 def decide(
     scene: Scene,
-    surfaces: list[Surface],
+    surfaces: list[AnySurface],
     surface_of: tuple[int, ...],
     light: Lighting,
     depth: int,
     budget: float,
     forced: Mapping[str, bool],
-) -> tuple[list[Effect], list[Surface]]:
+) -> tuple[list[Effect], list[AnySurface]]:
     """The terms and their options, each with its bound, and the surfaces without those that are left out."""
     visible = contributions.seen(scene, surface_of, len(surfaces))
     rows: list[_Row] = []
     for number, surface in enumerate(surfaces):
         owner = _name(scene, surface_of.index(number))
+        if isinstance(surface, Measured):
+            bound = _bound(scene, surface, surface.without(LABEL), visible[number], light, depth, budget)
+            rows.append(_Row(Effect(f"{owner}: {LABEL}", True, ESTIMATED, 0.0, bound), number, LABEL))
+            continue
         values = surface.values(torch.zeros((), dtype=torch.float64))
         for term in surface.form.terms:
             own = surface.form.of_term(term, values)
@@ -106,8 +112,8 @@ def _swapped(model: Model, own: Values, word: str) -> tuple[bool | None, str] | 
 
 
 def _chosen(
-    rows: list[_Row], surfaces: list[Surface], budget: float, forced: Mapping[str, bool]
-) -> tuple[list[Effect], list[Surface]]:
+    rows: list[_Row], surfaces: list[AnySurface], budget: float, forced: Mapping[str, bool]
+) -> tuple[list[Effect], list[AnySurface]]:
     """The rows with their decisions: smallest bound first, while they add up to no more than the budget."""
     made, spent, gone = {}, 0.0, set()
     for row in sorted(rows, key=lambda row: (row.effect.error, row.word is not None)):
@@ -120,8 +126,8 @@ def _chosen(
             spent += bound if effect.name not in forced else 0.0
             if row.word is None:
                 gone.add(term)
-                surface = replace(surface, dropped=surface.dropped | {row.label})
-            else:
+                surface = surface.without(row.label)
+            elif not isinstance(surface, Measured):
                 words = surface.simpler.get(row.label, frozenset()) | {row.word}
                 surface = replace(surface, simpler={**surface.simpler, row.label: words})
             surfaces[row.number] = surface
@@ -132,8 +138,8 @@ def _chosen(
 
 def _bound(
     scene: Scene,
-    whole: Surface,
-    less: Surface,
+    whole: AnySurface,
+    less: AnySurface,
     visible: contributions.Seen,
     light: Lighting,
     depth: int,
@@ -141,7 +147,7 @@ def _bound(
 ) -> float:
     """What the image loses at most where `less` takes the place of `whole` [radiance]."""
     bound = contributions.lost_highlight(scene, whole, less, visible.vertices, budget)
-    peak = contributions.diffuse_peak(whole)
+    peak = whole.peak
     if light.even:
         fine = min(max(1e-2 * budget / light.even, 1e-9), 1e-3)
         for tolerance in (contributions.ROUGH, fine):  # what is far too much is known soon

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from .shapes import Shape
+from .shapes import Shape, inner
 
 NEARER = 1 - 1e-6  # a light in the plane of a shape, as in a ceiling, is in front of it
 
@@ -30,7 +30,7 @@ class Vertices:
 
     def local(self, w: Tensor) -> Tensor:
         """Directions (N, 3) of the scene in the materials' frames."""
-        return torch.stack([(w * axis).sum(-1) for axis in self.axes], dim=-1)
+        return torch.stack([inner(w, axis) for axis in self.axes], dim=-1)
 
     def world(self, w: Tensor) -> Tensor:
         """Directions (N, 3) of the materials' frames in the scene."""

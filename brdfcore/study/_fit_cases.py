@@ -37,9 +37,9 @@ def case(size: int, seed: int) -> Case:
     return Case(samples, model, Problem(check(1, model, azimuth_observed=True), samples, LOSSES["cosine"]))
 
 
-def generated(size: int, seed: int) -> Samples:
-    """So many noisy samples [1/sr] of the known material: half uniform over the hemisphere, half drawn by it."""
-    truth = material(TRUE)
+def generated(size: int, seed: int, text: str = TRUE, noise: float = NOISE) -> Samples:
+    """So many noisy samples [1/sr] of a known material: half uniform over the hemisphere, half drawn by it."""
+    truth = material(text)
     generator = torch.Generator().manual_seed(seed)
     pairs: list[tuple[Tensor, Tensor]] = []
     found = 0
@@ -56,8 +56,8 @@ def generated(size: int, seed: int) -> Samples:
     wi, wo = (torch.cat(parts)[:size] for parts in zip(*pairs, strict=True))
     with torch.no_grad():
         f = truth.f(wi, wo)
-    noise = 1 + NOISE * torch.randn(f.shape, dtype=torch.float64, generator=generator)
-    return Samples(wi, wo, f * noise, azimuth_observed=True)
+    factor = 1 + noise * torch.randn(f.shape, dtype=torch.float64, generator=generator)
+    return Samples(wi, wo, f * factor, azimuth_observed=True)
 
 
 def start(problem: Problem, seed: int) -> Tensor:

@@ -5,9 +5,12 @@ import platform
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from ..plots._panels import Panel
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Cell = str | float | int | bool | None
 PEERS = ("scipy", "lmfit")
@@ -27,8 +30,17 @@ class Chart:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """A figure of images, which has no curves whose points could be told."""
+
+    name: str  # of its file, without the suffix
+    title: str
+    figure: "Figure"
+
+
+@dataclass(frozen=True)
 class Study:
-    """A table, plots of accuracy against time, one sentence to act on, and what a reader has to know of them.
+    """A table, plots of accuracy against time, pictures, one sentence to act on, and what a reader has to know of them.
 
     `provenance` holds the machine, versions, threads, seed and date once `run` has made the study.
     """
@@ -40,6 +52,7 @@ class Study:
     charts: tuple[Chart, ...]
     sentence: str
     notes: tuple[str, ...] = ()
+    pictures: tuple[Picture, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
 
 

@@ -40,6 +40,7 @@ def to_dict(study: Study) -> dict[str, Any]:
         "columns": list(study.columns),
         "rows": [[_plain(cell) for cell in row] for row in study.rows],
         "plots": [_chart(chart) for chart in study.charts],
+        "pictures": [{"name": picture.name, "title": picture.title} for picture in study.pictures],
         "provenance": study.provenance,
     }
 
@@ -52,7 +53,7 @@ def figure(chart: Chart) -> "Figure":
 
 
 def write(study: Study, folder: Path) -> list[Path]:
-    """The files that were written into the folder, which is made where it is missing: text, JSON, and each plot.
+    """The files that were written into the folder, made where it is missing: text, JSON, plots and pictures.
 
     They replace files of the same names, which an earlier run of the same study left.
     """
@@ -61,6 +62,7 @@ def write(study: Study, folder: Path) -> list[Path]:
         f"{study.name}.txt": (text(study) + "\n").encode(),
         f"{study.name}.json": (json.dumps(to_dict(study), indent=2, allow_nan=False) + "\n").encode(),
         **{f"{chart.name}.svg": to_bytes(figure(chart), "svg") for chart in study.charts},
+        **{f"{picture.name}.svg": to_bytes(picture.figure, "svg") for picture in study.pictures},
     }
     for name, content in files.items():
         (folder / name).write_bytes(content)

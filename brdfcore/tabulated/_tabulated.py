@@ -32,9 +32,10 @@ class Tabulated:
     draws outgoing directions, which is as good as the material is reciprocal; `pdf` is its true density either way.
     """
 
-    def __init__(self, grid: Grid, name: str = "measured") -> None:
+    def __init__(self, grid: Grid, name: str = "measured", path: Path | None = None) -> None:
         self.grid = grid
         self.name = name
+        self.path = path  # of the file that it was read from
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> "Tabulated":
@@ -48,7 +49,7 @@ class Tabulated:
                     f"Expected a file that is a grid ({' or '.join(GRIDDED)}), got {name}. Fit it with bc.fit.",
                     field="path",
                 )
-            return cls(GRIDDED[name](file), file.name)
+            return cls(GRIDDED[name](file), file.name, file)
         except OSError as error:
             raise FormatError(
                 f"Expected path to be a readable file, got {file.name!r} ({error.strerror}). Check the path.",

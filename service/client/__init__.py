@@ -22,7 +22,8 @@ from .errors import (
     WaitError,
 )
 from .fits import AsyncFitResult, ExportedFile, FitResult
-from .requests import Declared, Directions, FitOptions
+from .renders import AsyncRenderResult, RenderResult
+from .requests import Declared, Directions, FitOptions, RenderOptions
 from .tables import AsyncTableResult, TableResult
 from .waiting import Client
 
@@ -30,6 +31,7 @@ __all__ = [
     "AsyncBatchResult",
     "AsyncClient",
     "AsyncFitResult",
+    "AsyncRenderResult",
     "AsyncTableResult",
     "BatchResult",
     "Client",
@@ -44,6 +46,8 @@ __all__ = [
     "JobFailedError",
     "JobUnfinishedError",
     "ProblemError",
+    "RenderOptions",
+    "RenderResult",
     "TableResult",
     "UnreachableError",
     "WaitError",

@@ -23,7 +23,8 @@ from .calls import Ask, Call, Pause, Tell
 from .errors import FitFailedError
 from .fits import AsyncFitResult
 from .persistence import persistent, settings
-from .requests import Axes, Declared, Directions, File, FitOptions, Material
+from .renders import AsyncRenderResult
+from .requests import Axes, Declared, Directions, File, FitOptions, Material, RenderOptions, Scene
 from .tables import AsyncTableResult
 
 _PIECE = 2**20  # bytes of a file that are sent at once
@@ -122,6 +123,10 @@ class AsyncClient:
         """The directional albedos of a material for polar angles [degrees]."""
         return await self._run(requests.albedo(material, theta_deg, phi_deg, tolerance))
 
+    async def sphere(self, material: Material, channels: Sequence[str] | None = None, size: int = 160) -> bytes:
+        """A lit sphere of a material as the bytes of a PNG file, as `Client.sphere` gives it."""
+        return await self._run(requests.sphere(material, channels, size))
+
     async def albedo_table(
         self,
         material: Material,
@@ -138,6 +143,23 @@ class AsyncClient:
     async def get_table(self, table_id: str) -> AsyncTableResult:
         """The table of that id as it stands."""
         return AsyncTableResult(self._run, await self._run(requests.get_table(table_id)))
+
+    async def render(
+        self,
+        scene: Scene,
+        *,
+        wait: bool = True,
+        timeout: float | None = None,
+        progress: Tell | None = None,
+        **options: Unpack[RenderOptions],
+    ) -> AsyncRenderResult:
+        """The image of a scene, as `Client.render` gives it."""
+        asked = requests.render(scene, options, wait=wait, timeout=timeout, progress=progress)
+        return AsyncRenderResult(self._run, await self._run(asked))
+
+    async def get_render(self, render_id: str) -> AsyncRenderResult:
+        """The render of that id as it stands."""
+        return AsyncRenderResult(self._run, await self._run(requests.get_render(render_id)))
 
     async def _run(self, call: Call[_T]) -> _T:
         """The result of a call, its steps taken one after the other."""

@@ -20,15 +20,17 @@ from ..schemas import (
     JobView,
     ModelList,
     ModelView,
+    RenderView,
     TableView,
 )
-from .calls import Call, Tell, finished, read
+from .calls import Call, Tell, content, finished, read
 from .data import material_of, placed, plain, uploaded
 from .errors import FitFailedError, JobFailedError
 
 LONGEST = 30.0  # how long one request waits for its job; the service caps it at 60 [s]
 _Job = TypeVar("_Job", bound=JobView)
 Material = Any  # a text, a preset's name, its JSON, or an object like brdfcore.Material
+Scene = Any  # the name of a shipped one, its JSON, or an object like brdfcore.render.Scene
 File = str | os.PathLike[str]
 Axes = Mapping[str, tuple[float, float] | None]
 
@@ -57,6 +59,15 @@ class FitOptions(Declared, total=False):
     robust_scale: float | None
     max_theta_deg: float | None
     conserve_energy: bool
+
+
+class RenderOptions(TypedDict, total=False):
+    """What may be asked of an image, as fields of POST /v1/renders; what is absent the scene says."""
+
+    tolerance: float
+    samples: int
+    noise: float
+    seed: int
 
 
 class Directions(TypedDict, total=False):
@@ -161,6 +172,29 @@ def albedo(material: Material, theta_deg: Any, phi_deg: float, tolerance: float)
     """A material's albedos."""
     body = {"theta_deg": plain(theta_deg), "phi_deg": phi_deg, "tolerance": tolerance}
     return read(AlbedoView, "POST", "/v1/albedo", json={"material": material_of(material), **body})
+
+
+def sphere(material: Material, channels: Sequence[str] | None, size: int) -> Call[bytes]:
+    """A lit sphere of a material."""
+    body = {"material": material_of(material), "channels": plain(channels), "size": size}
+    return content("POST", "/v1/sphere", json=body)
+
+
+def render(
+    scene: Scene, options: RenderOptions, *, wait: bool, timeout: float | None, progress: Tell | None
+) -> Call[RenderView]:
+    """The image of a scene, finished where that is to be waited for."""
+    begun = time.monotonic()
+    body = {"scene": material_of(scene), **options}
+    view = yield from _submitted("/v1/renders", body, RenderView, wait and progress is None, timeout)
+    if not wait:
+        return view
+    return (yield from finished("/v1/renders", view, "render", JobFailedError, _left(begun, timeout), progress))
+
+
+def get_render(render_id: str) -> Call[RenderView]:
+    """The render of that id."""
+    return read(RenderView, "GET", f"/v1/renders/{render_id}")
 
 
 def _parted(options: FitOptions) -> tuple[Declared, dict[str, Any]]:

@@ -22,7 +22,8 @@ from .calls import Ask, Call, Pause, Tell
 from .errors import FitFailedError
 from .fits import FitResult
 from .persistence import persistent, settings
-from .requests import Axes, Declared, Directions, File, FitOptions, Material
+from .renders import RenderResult
+from .requests import Axes, Declared, Directions, File, FitOptions, Material, RenderOptions, Scene
 from .tables import TableResult
 
 _T = TypeVar("_T")
@@ -127,6 +128,10 @@ class Client:
         """The directional albedos of a material, given as in `evaluate`, for polar angles [degrees]."""
         return self._run(requests.albedo(material, theta_deg, phi_deg, tolerance))
 
+    def sphere(self, material: Material, channels: Sequence[str] | None = None, size: int = 160) -> bytes:
+        """A lit sphere of a material, given as in `evaluate`, as a PNG file; `channels` give it its colour."""
+        return self._run(requests.sphere(material, channels, size))
+
     def albedo_table(
         self,
         material: Material,
@@ -145,6 +150,26 @@ class Client:
     def get_table(self, table_id: str) -> TableResult:
         """The table of that id as it stands."""
         return TableResult(self._run, self._run(requests.get_table(table_id)))
+
+    def render(
+        self,
+        scene: Scene,
+        *,
+        wait: bool = True,
+        timeout: float | None = None,
+        progress: Tell | None = None,
+        **options: Unpack[RenderOptions],
+    ) -> RenderResult:
+        """The image of a scene: the name of a shipped one, its JSON, or an object like brdfcore.render.Scene.
+
+        With wait=True it is finished on return; raises JobFailedError, and WaitError after `timeout` s.
+        """
+        asked = requests.render(scene, options, wait=wait, timeout=timeout, progress=progress)
+        return RenderResult(self._run, self._run(asked))
+
+    def get_render(self, render_id: str) -> RenderResult:
+        """The render of that id as it stands."""
+        return RenderResult(self._run, self._run(requests.get_render(render_id)))
 
     def _run(self, call: Call[_T]) -> _T:
         """The result of a call, its steps taken one after the other."""

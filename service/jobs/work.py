@@ -22,9 +22,9 @@ from brdfcore.errors import BrdfError
 from brdfcore.fitting import Progress, fit
 from brdfcore.fitting.comparison import compare
 
-from .. import disk, tables
+from .. import disk, renders, tables
 from ..datasets import Datasets
-from ..schemas import AlbedoRequest, FitRequest, JobKind
+from ..schemas import AlbedoRequest, FitRequest, JobKind, RenderRequest
 from .retries import ASK_FOR_LESS
 
 _PROGRESS_EVERY = 0.1  # [s]; each word of progress becomes a write to the disk
@@ -97,18 +97,34 @@ def _fitted(say: Say, data: Path, body: bytes) -> str:
 
 def _tabulated(say: Say, data: Path, body: bytes) -> str:
     """Facts about the table, which itself is in the folder of tables under its hash."""
+    made = tables.made(AlbedoRequest.model_validate_json(body), data, _shares(say, "table"))
+    return json.dumps(made, allow_nan=False)
+
+
+def _rendered(say: Say, data: Path, body: bytes) -> str:
+    """Facts about the image, which itself is in the folder of images under its hash."""
+    made = renders.made(RenderRequest.model_validate_json(body), data, _shares(say, "render"))
+    return json.dumps(made, allow_nan=False)
+
+
+def _shares(say: Say, stage: str) -> Callable[[float], None]:
+    """What hears which share of the work is done, and says so now and then."""
     last = -math.inf
 
     def report(fraction: float) -> None:
         nonlocal last
         if time.monotonic() - last >= _PROGRESS_EVERY or fraction >= 1:
             last = time.monotonic()
-            say(("progress", json.dumps({"stage": "table", "fraction": fraction, "loss": None})))
+            say(("progress", json.dumps({"stage": stage, "fraction": fraction, "loss": None})))
 
-    return json.dumps(tables.made(AlbedoRequest.model_validate_json(body), data, report), allow_nan=False)
+    return report
 
 
-_WORK: dict[JobKind, Callable[[Say, Path, bytes], str]] = {"fit": _fitted, "albedo_table": _tabulated}
+_WORK: dict[JobKind, Callable[[Say, Path, bytes], str]] = {
+    "fit": _fitted,
+    "albedo_table": _tabulated,
+    "render": _rendered,
+}
 
 
 def _settle(memory: int) -> None:

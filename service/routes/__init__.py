@@ -1,6 +1,22 @@
 """The routes, one file a resource."""
 
-from . import albedo, batches, datasets, docs, evaluate, events, export, fits, formats, health, models, page, plots
+from . import (
+    albedo,
+    batches,
+    datasets,
+    docs,
+    evaluate,
+    events,
+    export,
+    fits,
+    formats,
+    health,
+    models,
+    page,
+    plots,
+    renders,
+    sphere,
+)
 
 ROUTERS = (
     datasets.router,
@@ -10,7 +26,9 @@ ROUTERS = (
     plots.router,
     export.router,
     albedo.router,
+    renders.router,
     evaluate.router,
+    sphere.router,
     models.router,
     formats.router,
     health.router,

@@ -88,6 +88,12 @@ async def json_accepted(request: Request) -> None:
     require_accepted(request, "application/json")
 
 
+def unchanged(request: Request, tag: str) -> bool:
+    """Whether the client has what an entity tag names, by its If-None-Match; a 304 says so."""
+    known = [name.strip().removeprefix("W/") for name in request.headers.get("if-none-match", "").split(",")]
+    return tag in known or "*" in known
+
+
 def _quality(accept: str, media_type: str) -> float:
     """How much a media type is wanted, 0 to 1; RFC 9110: the most specific range that matches decides."""
     family = media_type.partition("/")[0]

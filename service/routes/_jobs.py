@@ -21,8 +21,8 @@ from ..schemas import FINISHED, JobKind, JobStatus
 from ..state import State, state
 
 _LONGEST_WAIT = 60.0  # [s]
-_NAME: dict[JobKind, str] = {"fit": "fit", "albedo_table": "table of albedos"}
-_PATH: dict[JobKind, str] = {"fit": "/v1/fits", "albedo_table": "/v1/albedo"}
+_NAME: dict[JobKind, str] = {"fit": "fit", "albedo_table": "table of albedos", "render": "render"}
+_PATH: dict[JobKind, str] = {"fit": "/v1/fits", "albedo_table": "/v1/albedo", "render": "/v1/renders"}
 
 
 class Page(BaseModel):

@@ -1,4 +1,4 @@
-"""GET /v1/fits/{fit_id}/events and /v1/albedo/{table_id}/events: a job's progress as server-sent events."""
+"""GET /v1/fits/{fit_id}/events, and those of tables and renders: a job's progress as server-sent events."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -28,6 +28,10 @@ async def _table(request: Request, table_id: str) -> Job:
     return _found(request, "albedo_table", table_id)
 
 
+async def _render(request: Request, render_id: str) -> Job:
+    return _found(request, "render", render_id)
+
+
 def _found(request: Request, kind: JobKind, job_id: str) -> Job:
     require_accepted(request, "text/event-stream")
     return _jobs.found(state(request), kind, job_id)
@@ -50,6 +54,15 @@ async def table_events(
     request: Request, job: Annotated[Job, Depends(_table)], last: Last = None
 ) -> AsyncIterator[ServerSentEvent]:
     """Stream a table's progress: `progress` whenever it changes, then one event named by the status it ends with."""
+    async for event in _events(request, job, last):
+        yield event
+
+
+@router.get("/v1/renders/{render_id}/events", response_class=EventSourceResponse, responses=responses(404, 406, 422))
+async def render_events(
+    request: Request, job: Annotated[Job, Depends(_render)], last: Last = None
+) -> AsyncIterator[ServerSentEvent]:
+    """Stream a render's progress: `progress` whenever it changes, then one event named by the status it ends with."""
     async for event in _events(request, job, last):
         yield event
 

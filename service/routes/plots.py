@@ -14,7 +14,7 @@ from brdfcore.errors import unknown_name
 from ..errors import ProblemError, responses
 from ..schemas import FitOutcome, FitRequest
 from ..state import State, state
-from ._http import require_accepted
+from ._http import require_accepted, unchanged
 from ._jobs import absent, found
 
 if TYPE_CHECKING:
@@ -104,8 +104,7 @@ async def _plot(request: Request, fit_id: str, asked: Asked, kind: Kind) -> Resp
     shown = f"{bc.__version__} {job.id} {job.finished} {kind} {type(asked).__name__} {asked.model_dump_json()}"
     tag = f'"{hashlib.sha256(shown.encode()).hexdigest()[:32]}"'
     headers = {"etag": tag, "cache-control": "private, no-cache"}
-    known = [name.strip().removeprefix("W/") for name in request.headers.get("if-none-match", "").split(",")]
-    if tag in known or "*" in known:
+    if unchanged(request, tag):
         return Response(status_code=304, headers=headers)
     body = service.store.body(fit_id)
     if body is None:

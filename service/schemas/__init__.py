@@ -8,8 +8,18 @@ from .batches import BatchPage, BatchRequest, BatchRow, BatchTable, BatchView
 from .datasets import DatasetSamples, DatasetView, FormatList, FormatView, InlineSamples
 from .fits import FitPage, FitRequest, FitSummary, FitView, RequestView, SamplesView
 from .jobs import FINISHED, JobKind, JobStatus, JobView, ProgressEvent, ProgressView
-from .materials import AlbedoRequest, AlbedoView, EvaluationRequest, EvaluationView, ModelList, ModelView, PresetView
+from .materials import (
+    AlbedoRequest,
+    AlbedoView,
+    EvaluationRequest,
+    EvaluationView,
+    ModelList,
+    ModelView,
+    PresetView,
+    SphereRequest,
+)
 from .problems import FieldError, HealthView, Problem
+from .renders import EffectView, PlanView, RenderOutcome, RenderPage, RenderRequest, RenderSummary, RenderView
 from .results import CertificateView, ComparisonView, CostView, FitOutcome, Interval
 from .tables import TableOutcome, TablePage, TableSummary, TableView
 
@@ -28,6 +38,7 @@ __all__ = [
     "DatasetSamples",
     "DatasetView",
     "DirectionPairs",
+    "EffectView",
     "EvaluationRequest",
     "EvaluationView",
     "FieldError",
@@ -46,12 +57,19 @@ __all__ = [
     "JobView",
     "ModelList",
     "ModelView",
+    "PlanView",
     "PresetView",
     "Problem",
     "ProgressEvent",
     "ProgressView",
+    "RenderOutcome",
+    "RenderPage",
+    "RenderRequest",
+    "RenderSummary",
+    "RenderView",
     "RequestView",
     "SamplesView",
+    "SphereRequest",
     "TableOutcome",
     "TablePage",
     "TableSummary",

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from ._base import View
 
-JobKind = Literal["fit", "albedo_table"]
+JobKind = Literal["fit", "albedo_table", "render"]
 
 
 JobStatus = Literal["queued", "running", "succeeded", "failed", "cancelled"]

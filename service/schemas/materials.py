@@ -90,3 +90,14 @@ class AlbedoView(View):
     method: str
     evaluations: int = Field(description="directions at which lobes were evaluated")
     seconds: float
+
+
+class SphereRequest(Body):
+    """A material, and how the sphere of it is shown."""
+
+    material: MaterialIn = Field(description="text, name of a preset, or a material's JSON")
+    channels: Annotated[list[str], Field(min_length=1, max_length=64)] | None = Field(
+        None, description="names of the channels: wavelengths in nm make a spectrum, three others red, green and blue"
+    )
+    channel: int = Field(0, ge=0, description="number of the channel that is shown in gray where they have no colour")
+    size: int = Field(160, ge=16, le=512, description="pixels along an edge")

@@ -100,6 +100,19 @@ def test_convert_keeps_everything(suffix: str, run: Run) -> None:
     assert after.azimuth_observed is before.azimuth_observed is False
 
 
+def test_a_table_whose_channels_cannot_be_columns_is_sent_to_npz(run: Run) -> None:
+    text = "#DIM 6 3\n#PARAM_IN CARTESIAN\n#PARAM_OUT XYZ_COLOR\n0 0 1 0 0 1 .1 .2 .3\n"
+    Path("xyz.alta").write_text(text)
+    code, _, err = run("convert", "xyz.alta", "out.csv", "--quantity", "brdf")
+    assert code == 2
+    assert (
+        "Expected channels to be value, or r, g, b, or wavelengths in nm for a table, got x, y, z. Write an .npz" in err
+    )
+    assert not Path("out.csv").exists()
+    assert run("convert", "xyz.alta", "out.npz", "--quantity", "brdf")[0] == 0
+    assert bc.read("out.npz").channels == ("x", "y", "z")
+
+
 @pytest.mark.parametrize(
     ("out", "words"),
     [

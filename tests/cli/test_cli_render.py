@@ -33,7 +33,8 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 
 
 def test_it_prints_the_plan_and_writes_the_image(run: Run) -> None:
-    code, out, error = run("ball.json")
+    code, out, error = run("ball.json", "--contours", "lines.svg")
+    assert "ball</text>" in pathlib.Path("lines.svg").read_text()
     assert (code, error) == (0, "")
     assert "ball: ggx fresnel" in out
     assert out.splitlines()[-1].startswith("ball.png: ")
@@ -65,8 +66,18 @@ def test_it_plans_only_and_lists_scenes(run: Run) -> None:
 def test_mistakes_are_one_sentence(run: Run) -> None:
     code, out, error = run("ball.json", "-o", "ball.jpg")
     assert (code, out) == (2, "")
-    assert error == "brdf: Expected the image's file to end in .png or .npy, got 'ball.jpg'. Rename it.\n"
-    assert run("ball.json", "--device", "tpu")[2].startswith("brdf: Expected --device to be cpu or cuda, got 'tpu'.")
-    assert run("bull.json")[0] == 2
+    assert error == "brdf: Expected the image's file to end in .png, .npy, .exr, got 'ball.jpg'. Rename it.\n"
+    assert run("ball.json", "--device", "tpu")[2].startswith("brdf: Expected device to be cpu, or cuda where")
+    assert run("ball.json", "-o", "none/ball.png")[2].startswith(
+        "brdf: Expected the image's folder to exist, got 'none'"
+    )
+    assert run("ball.json", "--contours", "a.gif")[2].startswith(
+        "brdf: Expected the plot's file to end in .svg or .png"
+    )
+    assert run("bull.json")[2].startswith("brdf: Expected scene to be a readable file, got 'bull.json' (No such file")
     assert "Did you mean 'walter_figure_3'?" in run("walter_figure_4")[2]
+    assert run("ball.json", "--seed", "-1")[2].startswith("brdf: Expected seed to be a whole number from 0 to")
+    assert run("ball.json", "--bounces", "-1")[2].startswith(
+        "brdf: Expected bounces to be a whole number from 0 to 1024"
+    )
     assert run("ball.json", "--off", "rain")[2].startswith("brdf: Expected an effect to be a known name, got 'rain'.")

@@ -15,7 +15,6 @@ DIRECTIONS = 4
 REFERENCE = 1e-13
 FINER = 1e-4  # of a case's tolerance
 SHARE = 1e-3  # of dishonest claims
-HARDEST = 1e-9  # of a reference to 1e-12
 
 
 def allowed(n: int) -> int:
@@ -58,22 +57,13 @@ def test_claims_are_honest_met_and_tight(cases: int):
 
 @pytest.mark.parametrize("count", [40, pytest.param(4_000, marks=pytest.mark.full)])
 def test_a_reference_to_1e_12_is_within_reach(count: int):
-    """Of every model, in its whole box, at every angle to 89.999 degrees (but where the lobe itself overflows).
-
-    Anisotropic ggx of a wide and a very narrow width is beyond the largest rule in some cases, which say so: at most
-    1e-9.
-    """
+    """Of every model, in its whole box, at every angle to 89.999 degrees (but where the lobe itself overflows)."""
     rng = np.random.default_rng(SEED + 1)
-    missed, hard = [], 0
+    missed = []
     for index in range(count):
         case = random_case(rng, CHOICES[index % len(CHOICES)], DIRECTIONS)
         found = case.albedo(1e-12)
         bad = (found.error > 1e-12 * found.values.clamp(min=1)) & found.error.isfinite()
-        choice = case.form.terms[0].model
-        if bool(bad.any()) and choice.name == "ggx" and "anisotropic" in choice.options:
-            assert float(found.error.max()) <= HARDEST
-            hard += 1
-        elif bool(bad.any()):
+        if bool(bad.any()):
             missed.append((case, found.error[bad].tolist()))
     assert not missed
-    assert hard <= 0.02 * count

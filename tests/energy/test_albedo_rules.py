@@ -9,14 +9,16 @@ import torch
 from albedo_cases import prepared, random_case
 
 import brdfcore as bc
+from brdfcore.energy import grading
 from brdfcore.energy.chords import _kernel, _level
 from brdfcore.energy.closed_forms import EXACT
-from brdfcore.energy.grading import graded
+from brdfcore.energy.grading import SCALES, Dense, graded
 from brdfcore.energy.lobes import PROFILES
 from brdfcore.energy.plan import SINGLE
 from brdfcore.energy.refinement import Rows
 from brdfcore.energy.rules import LADDER, gauss, ring
 from brdfcore.energy.slope_disc import SlopeDisc
+from brdfcore.errors import InvalidValueError
 
 # --- rules in one dimension ------------------------------------------------------------------------------------------
 
@@ -70,6 +72,21 @@ def test_graded_angles_go_once_round(y):
     assert float(slope.mean()) == pytest.approx(1, abs=1e-12)
 
 
+def test_a_dense_map_is_inverted_and_goes_once_round():
+    """The v of its w are equal steps, the mean of dw/dv is 1, and dw/dv is the quotient of differences."""
+    rng = np.random.default_rng(7)
+    width = torch.tensor(10 ** rng.uniform(-3, 0, (16, 2))).repeat_interleave(SCALES, 1)
+    width = (width * 3.5 ** (torch.arange(2 * SCALES) % SCALES)).clamp(max=1.0)
+    place = torch.tensor(rng.uniform(-7, 7, (16, 2))).repeat_interleave(SCALES, 1)
+    dense = Dense(torch.full((16, 1), 0.08).double(), place, width)
+    v = torch.arange(8192, dtype=torch.float64)[None] * (2 * math.pi / 8192)
+    w, slope = dense.at(v)
+    assert torch.allclose(torch.sin(0.5 * (dense.before(w)[0] - v)), torch.zeros_like(w), rtol=0, atol=1e-13)
+    assert torch.allclose(slope.mean(1), slope.new_ones(16), rtol=0, atol=1e-12)
+    ahead = dense.at(v + 1e-6)[0]
+    assert torch.allclose(torch.remainder(ahead - w, 2 * math.pi) / 1e-6, slope, rtol=0, atol=1e-2 * float(slope.max()))
+
+
 # --- integrals -------------------------------------------------------------------------------------------------------
 
 
@@ -92,6 +109,7 @@ CLOSED = [
     "oren_nayar(energy_preserving, kd=0.4, sigma=1.2)",
     "ward_bounded(rs=1, a=0.3)",
     "ward_bounded(rs=1, ax=0.1, ay=0.7)",
+    "ward_neumann(rs=1, a=0.4)",
     "lafortune(ks=1, cx=-0.9, cy=-0.5, n=7.5)",
     "lafortune(ks=1, cx=0.6, cy=-1.3, n=1)",
     "edwards(ks=1, rx=0.4, ry=0.9, n=1.5)",
@@ -143,6 +161,29 @@ def test_chords_agree_with_rays(text, width):
     assert torch.allclose(chords.values, rays.values, rtol=0, atol=2e-12)
 
 
+@pytest.mark.parametrize("width", [1e-4, 0.02, 0.7, 10.0])
+def test_arcs_agree_with_rays(width):
+    """To 1e-12 at every angle; one of them, 30 degrees, at which two ends of the arcs' intervals meet."""
+    form, values = prepared(f"ward_neumann(rs=1, a={width})")
+    cosine = torch.cat([torch.linspace(0.05, 1, 8), torch.tensor([0.75**0.5, 0.8660]), 10.0 ** -torch.arange(2, 13)])
+    arcs, rays = (
+        bc.energy.of_form(form, values, cosine.double(), torch.tensor(0.9), 1e-12, m)
+        for m in ("closed_form", "slope_disc")
+    )
+    assert arcs.met
+    assert rays.met
+    assert arcs.evaluations < 0.2 * rays.evaluations
+    assert torch.allclose(arcs.values, rays.values, rtol=0, atol=2e-12)
+
+
+def test_arcs_are_of_isotropic_lobes():
+    """The anisotropic one is integrated along rays."""
+    form, values = prepared("ward_neumann(rs=1, ax=0.1, ay=0.3)")
+    assert bc.energy.of_form(form, values, torch.tensor(0.5), torch.tensor(0.0)).method == "slope_disc"
+    with pytest.raises(InvalidValueError, match="Expected method to suit ward_neumann, got closed_form"):
+        bc.energy.of_form(form, values, torch.tensor(0.5), torch.tensor(0.0), 1e-6, "closed_form")
+
+
 def test_the_chords_kernel():
     """Against its integral by 200 nodes, on both sides of where its closed form begins."""
     t, w = np.polynomial.legendre.leggauss(200)
@@ -153,6 +194,26 @@ def test_the_chords_kernel():
             assert float(got) == pytest.approx(expected, rel=3e-13 if c < 1 else 1e-11), (c, d)
             if c == 0:
                 assert float(_level(torch.tensor(d, dtype=torch.float64))) == pytest.approx(expected, rel=3e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "theta", "phi"),
+    [
+        ("ggx(constant, correlated, ks=1, ax=0.0344, ay=2.05)", 89.985, 173.07),
+        ("ggx(constant, separable, ks=1, ax=6.2, ay=0.148)", 89.99, 53.9),
+        ("ggx(constant, separable, ks=1, ax=9.72, ay=5e-4)", 89.962, 13.87),
+    ],
+)
+def test_a_narrow_and_a_wide_width_are_a_reference_too(text, theta, phi, monkeypatch):
+    """To 1e-12 with the rays that are dense where masking changes; without them, the same to 1e-9."""
+    form, values = prepared(text)
+    at = torch.tensor(math.cos(math.radians(theta))).double(), torch.tensor(math.radians(phi)).double()
+    found = bc.energy.of_form(form, values, *at, 1e-12)
+    assert found.met
+    assert found.evaluations < 3e6  # of 1e7 and more without
+    monkeypatch.setattr(grading, "SLIGHT", math.inf)
+    without = bc.energy.of_form(form, values, *at, 1e-9)
+    assert float((found.values - without.values).abs().max()) <= 1e-9
 
 
 @pytest.mark.parametrize("text", LOBES[1:6])

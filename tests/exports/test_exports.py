@@ -70,6 +70,15 @@ def test_a_refits_stated_difference_is_right(text):
     assert at.difference(radiance._f(made.content, at)) == pytest.approx(made.difference, rel=0.02)
 
 
+@pytest.mark.parametrize("name", ["radiance", "merl", "mitsuba"])
+def test_gray_is_three_equal_channels(name, small_tables):
+    """A gray material and the same one in three equal channels are as far from what a file of colours holds."""
+    gray = bc.material("lambert(kd=0.1) + kurt(ks=0.6, f0=0.3, m=0.2)")
+    coloured = bc.material("lambert(kd=[0.1, 0.1, 0.1]) + kurt(ks=0.6, f0=0.3, m=0.2)")
+    expected = bc.export(coloured, name).difference
+    assert bc.export(gray, name).difference == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
 def test_the_difference_is_its_definition():
     """Against a product rule over the hemispheres, for two smooth materials."""
     ours, other = bc.material("lambert(kd=0.3) + kurt(m=0.6, alpha=0)"), bc.material("lambert(kd=0.4)")
@@ -114,6 +123,20 @@ def test_a_path_gets_the_content(name, tmp_path, small_tables):
         assert "brdf_7_red_paint" in made.content
 
 
+def test_a_file_may_be_named_like_a_form_of_radiance(tmp_path):
+    material = bc.material("ashikhmin_shirley(n=300)")
+    expected = bc.export(material, "radiance")
+    assert "void ashik2 brdf\n" in expected.content
+    made = bc.export(material, "radiance", tmp_path / "WGMDfunc.rad")
+    assert "void ashik2 WGMDfunc\n" in made.content
+    assert made.difference == expected.difference
+
+
+def test_an_orientation_may_be_an_array():
+    made = bc.export(ANY, "radiance", orientation=np.array([0, 0.6, 0.8]))
+    assert "\n    void 0.0 0.6 0.8 .\n" in made.content
+
+
 def test_json_reads_back():
     material = bc.material(GLOSSY)
     read = bc.Material.from_json(json.loads(bc.export(material, "json").content))
@@ -131,7 +154,11 @@ ANY = bc.material("lambert")
 REFUSED = [
     ("glsl", ANY, {}, UnknownNameError, r"Expected format to be a known name, got 'glsl'\. .*brdf_explorer"),
     ("json", ANY, {"orientation": (0.0, 1.0, 0.0)}, InvalidValueError, r"orientation to be left out for json"),
-    ("radiance", ANY, {"orientation": (0.0, 0.0, 0.0)}, InvalidValueError, r"orientation to be a direction"),
+    *(
+        ("radiance", ANY, {"orientation": axis}, InvalidValueError, r"orientation to be a direction of three numbers")
+        for axis in ((0.0, 0.0, 0.0), (1.0, 2.0), (1e308, 1e308, 0.0), (math.nan, 0.0, 1.0), ("x", 0, 0), 5)
+    ),
+    ("json", "lambert", {}, InvalidValueError, "Expected material to be a Material, got str. Make one with bc.mater"),
     *(
         (name, bc.material("lambert(kd=[0.1, 0.2, 0.3, 0.4])"), {}, InvalidValueError, "one channel or three.* got 4")
         for name in bc.EXPORTS

@@ -10,7 +10,7 @@ import torch
 from format_cases import arrow_bytes, arrow_table, named_columns
 
 from brdfcore.errors import FormatError, SamplesError
-from brdfcore.formats import FORMATS, Masked, Samples, _arrow, read
+from brdfcore.formats import FORMATS, Masked, Samples, _size, read
 
 pyarrow = pytest.importorskip("pyarrow")
 ipc, parquet = pytest.importorskip("pyarrow.ipc"), pytest.importorskip("pyarrow.parquet")
@@ -110,8 +110,8 @@ def test_an_empty_table_is_refused(kind: str, tmp_path: Path) -> None:
 def test_large_tables_are_refused_before_they_are_read(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(_arrow, "MAX_NUMBERS", 14)
-    with pytest.raises(FormatError, match=r"a table of at most 14 numbers, got 1[57]"):
+    monkeypatch.setattr(_size, "MOST_NUMBERS", 14)
+    with pytest.raises(FormatError, match=r"a file of at most 14 numbers, got 1[57]"):
         read(save(arrow_table(), kind, tmp_path / "x"))
 
 
@@ -128,7 +128,7 @@ def test_compressed_messages_are_read(kind: str, compression: str, tmp_path: Pat
 @pytest.mark.parametrize("kind", ["new_file", "new_stream"])
 def test_a_bomb_is_refused_before_it_is_unpacked(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     count = 2_000_000
-    monkeypatch.setattr(_arrow, "MAX_NUMBERS", 1_000_000)
+    monkeypatch.setattr(_size, "MOST_NUMBERS", 1_000_000)
     table = pyarrow.table({**dict.fromkeys(("wi_x", "wi_y", "wo_x", "wo_y"), np.zeros(count)), "value": np.ones(count)})
     table = table.append_column("wi_z", [np.ones(count)]).append_column("wo_z", [np.ones(count)])
     with getattr(ipc, kind)(tmp_path / "x", table.schema, options=ipc.IpcWriteOptions(compression="zstd")) as writer:
@@ -137,7 +137,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(kind: str, tmp_path: Path, monk
     del table
     before = pyarrow.default_memory_pool().bytes_allocated()
     monkeypatch.setattr(ipc, "read_record_batch", lambda *_: pytest.fail("it was unpacked"))
-    with pytest.raises(FormatError, match=r"a table of at most 1,000,000 numbers, got 14,000,000\."):
+    with pytest.raises(FormatError, match=r"a file of at most 1,000,000 numbers, got 14,000,000\."):
         read(tmp_path / "x")
     assert pyarrow.default_memory_pool().bytes_allocated() <= before
 
@@ -171,5 +171,5 @@ def test_channels_that_would_not_read_back_are_not_written(kind: str, tmp_path: 
     samples = Samples(torch.tensor([[0.0, 0.0, 1.0]]), torch.tensor([[0.0, 0.0, 1.0]]), [[1.0, 2.0]], ("ir", "uv"))
     write = FORMATS[kind].write
     assert write is not None
-    with pytest.raises(FormatError, match="value columns to be value, or r, g, b"):
+    with pytest.raises(FormatError, match="channels to be value, or r, g, b, or wavelengths in nm for a table, got"):
         write(samples, tmp_path / "x")

@@ -103,6 +103,15 @@ def test_one_sigma_serves_every_channel(write: Write) -> None:
     assert sigma.tolist() == [[0.5, 0.5, 0.5]]
 
 
+def test_what_was_not_measured_has_no_sigma(write: Write) -> None:
+    text = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b,sigma_r,sigma_g,sigma_b\n{}45,0,45,180,1,2,3,.1,.2,.3\n"
+    for row in ("45,0,10,180,,,,,,\n", "45,0,10,180,1,,3,.1,,.3\n"):
+        samples = read(write(text.format(row)), quantity="brdf")
+        assert samples.masked == (Masked("a value's cell is empty", 1),)
+        assert samples.sigma is not None
+        assert samples.sigma.tolist() == [[0.1, 0.2, 0.3]]
+
+
 def test_empty_values_and_horizon_rows_are_masked_with_reason_and_count(write: Write) -> None:
     rows = "45,0,45,180,1,,3,.1,.1,.1,1\n45,0,90,180,1,2,3,.1,.1,.1,1\n-90,0,0,0,1,2,3,.1,.1,.1,1\n"
     samples = read(write(CSV + rows))
@@ -233,9 +242,7 @@ def test_write_csv_writes_round_degrees_as_such(tmp_path: Path) -> None:
 
 def test_write_csv_refuses_what_would_not_read_back(tmp_path: Path) -> None:
     samples = Samples.from_angles(30, 10, 60, 190, [[0.1, 0.2]], "degrees")
-    with pytest.raises(
-        FormatError, match=r"value columns to be value, or r, g, b, or distinct wavelengths .* got c0, c1"
-    ):
+    with pytest.raises(FormatError, match=r"channels to be value, or r, g, b, or wavelengths .* got c0, c1\. Write an"):
         write_csv(samples, tmp_path / "out.csv")
     named = Samples(samples.wi, samples.wo, samples.values, ("400", "500"))
     for comments in ({"quantity": "brdf"}, {"note": "two\nlines"}, {"no name": "x"}):
@@ -274,7 +281,7 @@ def test_columns_have_to_fit_the_file(write: Write) -> None:
 @pytest.mark.parametrize(("name", "off"), [("chassis_brdf", 2), ("solar_array_brdf", 2)])
 def test_real_satellites_peak_at_the_mirror_direction(name: str, off: float, measured: Path) -> None:
     path = measured / "satellite" / f"{name}.csv"
-    with pytest.raises(FormatError, match="for a table without a header row, pass columns"):
+    with pytest.raises(FormatError, match="For a table without a header row, pass columns"):
         read(path)
     samples = read(path, quantity="brdf", columns="theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value")
     assert len(samples) > 700

@@ -132,6 +132,15 @@ def test_masked_rows_and_many_channels_are_told(tmp_path: Path) -> None:
     assert "sample's azimuth      not observed, as the file or its format says" in text
 
 
+def test_a_reflectance_of_noise_has_no_negative_zero() -> None:
+    text = bc.info(evaluated("lambert(kd=0.9)", [0.0])).text()
+    assert "reflectance           theta_i 0: 0.9" in text
+    samples = evaluated("lambert(kd=0.9)", [0.0])
+    colours = torch.cat([samples.values, -1e-4 * samples.values], -1)
+    text = bc.info(bc.Samples(samples.wi, samples.wo, colours, ("450", "650"))).text()
+    assert "theta_i 0: 0.000 to 0.9" in text
+
+
 def test_json_holds_everything() -> None:
     found = bc.info(evaluated("lambert(kd=0.9)", [0.0, 30.0]))
     facts = json.loads(json.dumps(found.to_dict(), allow_nan=False))

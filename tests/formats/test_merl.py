@@ -168,3 +168,10 @@ def test_a_reconstructed_material_peaks_at_the_half_vector(measured: Path, tmp_p
     steep = samples.wi[:, 2] > math.cos(math.radians(45))
     near, far = (steep & (theta < 2)), (steep & (theta > 40))
     assert samples.values[near].mean() > 5 * samples.values[far].mean()
+
+
+def test_the_planes_are_scaled_as_the_databases_own_reader_does(small_merl: tuple[int, int, int], write: Write) -> None:
+    """BRDFRead.cpp multiplies what is stored by 1/1500, 1.15/1500 and 1.66/1500 for red, green and blue."""
+    stored = np.full((3, math.prod(small_merl)), 1500.0)
+    samples = read(write(np.array(small_merl, "<i4").tobytes() + stored.astype("<f8").tobytes()))
+    np.testing.assert_allclose(samples.values.unique(dim=0).numpy(), [[1.0, 1.15, 1.66]], rtol=1e-15)

@@ -9,7 +9,7 @@ import pytest
 from format_cases import named_columns, npy_bytes
 
 from brdfcore.errors import FormatError, SamplesError
-from brdfcore.formats import Samples, read
+from brdfcore.formats import Samples, _size, read
 
 Write = Callable[[bytes], Path]
 
@@ -73,3 +73,9 @@ def test_damaged_and_other_arrays_are_refused(content: bytes, words: str, write:
     with pytest.raises((FormatError, SamplesError)) as caught:
         read(write(content), format="npy", quantity="brdf")
     assert words in str(caught.value)
+
+
+def test_small_types_count_as_the_numbers_that_they_become(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_size, "MOST_NUMBERS", 14)
+    with pytest.raises(FormatError, match=r"a file of at most 14 numbers, got 15\. Split it"):
+        read(write(npy_bytes()), quantity="brdf")

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from brdfcore.errors import FormatError, SamplesError, UnknownNameError
-from brdfcore.formats import Masked, Samples, npz, read
+from brdfcore.formats import Masked, Samples, _size, npz, read
 
 Write = Callable[[bytes], Path]
 
@@ -177,7 +177,22 @@ def test_a_bomb_is_refused_by_the_directory(write: Write, monkeypatch: pytest.Mo
 
 
 def test_the_limit_is_two_gibibytes() -> None:
-    assert npz.MAX_UNCOMPRESSED_BYTES == 2**31
+    assert npz.MAX_UNCOMPRESSED_BYTES == 8 * _size.MOST_NUMBERS == 2**31
+
+
+def test_small_types_count_as_the_numbers_that_they_become(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An array of bytes takes eight times as much once it is read."""
+    monkeypatch.setattr(_size, "MOST_NUMBERS", 21)
+    content = saved(changed(sigma=None, theta_i=np.zeros(3, np.int8)))
+    assert len(read(write(content))) == 3  # of four angles, a weight and two channels
+    monkeypatch.setattr(_size, "MOST_NUMBERS", 20)
+    with pytest.raises(FormatError, match=r"a file of at most 20 numbers, got 21\. Split it"):
+        read(write(content))
+
+
+def test_names_of_channels_without_end_are_refused(write: Write) -> None:
+    with pytest.raises(FormatError, match=r"Expected channels to be at most 10,000 words, got 10,001\. Save one name"):
+        read(write(saved(changed(channels=np.full(10_001, "a")))))
 
 
 def test_a_header_that_claims_more_than_it_holds_is_refused(write: Write) -> None:

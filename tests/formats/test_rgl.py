@@ -10,7 +10,7 @@ import torch
 from rgl_file import rgl_arrays, rgl_bytes, tensor_file
 
 from brdfcore.errors import FormatError
-from brdfcore.formats import read, rgl
+from brdfcore.formats import _size, read, rgl
 from brdfcore.formats._warp import Corners, Table, Warp
 
 Write = Callable[[str | bytes], Path]
@@ -183,3 +183,12 @@ def test_a_file_without_light_is_refused(write: Write) -> None:
     arrays = {name: ARRAYS[name][:, -1:] for name in ("vndf", "luminance", "rgb")}
     with pytest.raises(FormatError, match="hold a node above the horizon, got none"):
         read(write(changed(theta_i=horizon, **arrays)))
+
+
+def test_small_types_count_as_the_numbers_that_they_become(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    numbers = sum(array.size for name, array in ARRAYS.items() if name != "description")
+    monkeypatch.setattr(_size, "MOST_NUMBERS", numbers)
+    read(write(rgl_bytes()))
+    monkeypatch.setattr(_size, "MOST_NUMBERS", numbers - 1)
+    with pytest.raises(FormatError, match=rf"a file of at most {numbers - 1:,} numbers, got {numbers:,}\. Split it"):
+        read(write(rgl_bytes()))

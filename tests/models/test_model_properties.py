@@ -8,6 +8,7 @@ import torch
 from model_cases import (
     CHOICE_IDS,
     CHOICES,
+    COVERING,
     DTYPES,
     EPS,
     EVERY_CHOICE,
@@ -18,6 +19,7 @@ from model_cases import (
     hemisphere,
     lobe_pairs,
     material_of,
+    name_of,
 )
 from torch.func import functional_call
 
@@ -275,7 +277,9 @@ LOBES_ALONE = [choice for choice in ISOTROPIC if "compensated" not in choice.opt
 
 @every_dtype
 @pytest.mark.parametrize(
-    "choice", [c for c in ISOTROPIC if "compensated" not in c.options], ids=lambda c: f"{c.name}({','.join(c.options)})"
+    "choice",
+    [c if c in COVERING else pytest.param(c, marks=pytest.mark.full) for c in LOBES_ALONE],
+    ids=[name_of(c) for c in LOBES_ALONE],
 )
 def test_equal_widths_are_isotropic(choice, dtype):
     rng = np.random.default_rng(20)

@@ -56,13 +56,14 @@ def first_bad(bad: torch.Tensor, values, wi, wo) -> str:
 @every_dtype
 @every_choice
 def test_no_value_and_no_gradient_is_nan(choice, dtype, quantity):
+    """Above the horizon; at and below it the next test asks for more."""
     values = over_corners(choice, dtype)
-    for wi, wo in (above_horizon(dtype), not_above_horizon(dtype)):
-        value, slopes = per_pair(choice, quantity, values, wi, wo)
-        assert not value.isnan().any(), f"{quantity}: {first_bad(value.isnan(), values, wi, wo)}"
-        assert bool((value >= 0).all()), f"{quantity} < 0: {first_bad(value < 0, values, wi, wo)}"
-        for key, slope in slopes.items():
-            assert not slope.isnan().any(), f"d {quantity}/d {key}: {first_bad(slope.isnan(), values, wi, wo)}"
+    wi, wo = above_horizon(dtype)
+    value, slopes = per_pair(choice, quantity, values, wi, wo)
+    assert not value.isnan().any(), f"{quantity}: {first_bad(value.isnan(), values, wi, wo)}"
+    assert bool((value >= 0).all()), f"{quantity} < 0: {first_bad(value < 0, values, wi, wo)}"
+    for key, slope in slopes.items():
+        assert not slope.isnan().any(), f"d {quantity}/d {key}: {first_bad(slope.isnan(), values, wi, wo)}"
 
 
 @pytest.mark.parametrize("quantity", ["f", "pdf"])

@@ -78,8 +78,9 @@ def test_channel_is_named(linoleum: bc.Samples) -> None:
         assert any(f"channel {name}" in text.get_text() for text in figure.texts)
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 6])
-@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize(
+    ("scale", "count"), [*((SCALES[0], count) for count in range(1, 7)), *((s, 4) for s in SCALES[1:])]
+)
 def test_files_open_and_are_reproducible(tmp_path: pathlib.Path, linoleum: bc.Samples, scale: str, count: int) -> None:
     figure = bc.plots.lobes(bc.material(MATERIAL), linoleum, scale=scale, theta_i_deg=range(25, 25 + 10 * count, 10))
     svg = bc.plots.save(figure, tmp_path / "lobes.svg")

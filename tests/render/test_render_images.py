@@ -25,6 +25,7 @@ from brdfcore.render import (
     plan,
     render,
 )
+from brdfcore.render._exr import exr
 
 FURNACE = {
     "gray": "lambert(kd=0.5)",
@@ -190,14 +191,54 @@ def test_files(tmp_path):
     rows = np.frombuffer(zlib.decompress(data[41 : 41 + size]), np.uint8).reshape(5, 16)[:, 1:].reshape(5, 5, 3)
     assert rows[2, 2].tolist() == [231, 170, 124]  # sRGB of 0.8, 0.4, 0.2
     assert rows[0, 0].tolist() == [255, 255, 255]  # the sky
-    with pytest.raises(InvalidValueError, match=r"^Expected the image's file to end in .png or .npy, got 'a.jpg'"):
+    with pytest.raises(InvalidValueError, match=r"^Expected the image's file to end in .png, .npy, .exr, got 'a.jpg'"):
         image.save(tmp_path / "a.jpg")
+
+
+def ramp(width: int = 5, height: int = 3) -> np.ndarray:
+    """Pixels of which no two have the same value, some beyond what a half could hold."""
+    return np.arange(width * height * 3, dtype=np.float32).reshape(height, width, 3) ** 5
+
+
+def test_exr_is_what_its_layout_says():
+    """Read by what the layout says of attributes, places and lines."""
+    data, pixels = exr(ramp()), ramp()
+    assert struct.unpack("<ii", data[:8]) == (20000630, 2)
+    at, attributes = 8, {}
+    while data[at]:
+        name, kind, rest = data[at:].split(b"\0", 2)
+        size = struct.unpack("<i", rest[:4])[0]
+        at += len(name) + len(kind) + 6 + size
+        attributes[name.decode()] = data[at - size : at]
+    assert struct.unpack("<4i", attributes["dataWindow"]) == (0, 0, 4, 2)
+    assert attributes["compression"] == b"\0"
+    assert attributes["channels"][:1] + attributes["channels"][18:19] + attributes["channels"][36:37] == b"BGR"
+    for y, place in enumerate(struct.unpack("<3Q", data[at + 1 : at + 25])):
+        assert struct.unpack("<ii", data[place : place + 8]) == (y, 60)
+        line = np.frombuffer(data[place + 8 : place + 68], "<f4").reshape(3, 5)
+        assert np.array_equal(line[::-1].T, pixels[y])
+    assert len(data) == place + 68
+
+
+def test_exr_is_read_by_mitsuba(tmp_path):
+    mitsuba = pytest.importorskip("mitsuba", reason="needs the renderer Mitsuba 3: pip install -e '.[peers]'")
+    mitsuba.set_variant("scalar_rgb")
+    image = render(lone_sphere("lambert(kd=[0.8, 0.4, 0.2])", [Dome(radiance=1e6)], size=5))
+    for pixels, path in ((image.pixels.float().numpy(), image.save(tmp_path / "a.exr")), (ramp(), tmp_path / "b.exr")):
+        path.write_bytes(exr(pixels))
+        assert np.array_equal(np.array(mitsuba.Bitmap(str(path))), pixels)
 
 
 def test_a_plan_of_another_scene():
     one, other = (lone_sphere("lambert", [Dome(radiance=1.0)]) for _ in range(2))
     with pytest.raises(InvalidValueError, match=r"^Expected plan to be of this scene"):
         render(one, plan(other))
+
+
+@pytest.mark.parametrize("device", ["tpu", "cuda:99", "meta"])
+def test_a_device_that_is_not_there(device):
+    with pytest.raises(InvalidValueError, match=rf"^Expected device to be cpu, or cuda where .* got '{device}'"):
+        render(lone_sphere("lambert", [Dome(radiance=1.0)]), device=device)
 
 
 def test_everything_leaves_nothing_out():

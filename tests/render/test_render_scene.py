@@ -7,7 +7,7 @@ import torch
 from render_cases import BALL, camera, random_scene
 
 import brdfcore as bc
-from brdfcore.errors import BrdfError, InvalidValueError
+from brdfcore.errors import BrdfError, FormatError, InvalidValueError
 from brdfcore.render import Dome, Plane, Rectangle, Scene, Sphere, SphereLight
 
 GOOD = {
@@ -56,6 +56,8 @@ def test_a_file_is_read_and_a_wrong_one_told(tmp_path):
     (tmp_path / "bad.json").write_text("{")
     with pytest.raises(InvalidValueError, match=r"^Expected bad.json to be JSON, got: .*Correct it there\.$"):
         Scene.load(tmp_path / "bad.json")
+    with pytest.raises(FormatError, match=r"^Expected scene to be a readable file, got 'none.json' \(No such file"):
+        Scene.load(tmp_path / "none.json")
     with pytest.raises(BrdfError, match=r"^Expected a scene to be a known name, got 'furnance'"):
         Scene.load("furnance")
 
@@ -76,7 +78,7 @@ BAD = {
         "objects/0/radius",
         -1,
         "objects[0].radius",
-        "Expected objects[0].radius to be a finite number above 0, got -1. Give it a size.",
+        "Expected objects[0].radius to be a finite number above 0, got -1. Give it a size, up to 1e+60.",
     ),
     "infinite size": ("objects/0/radius", float("inf"), "objects[0].radius", "got inf"),
     "unknown material": ("objects/0/material", "lambart", "objects[0].material", "Did you mean 'lambert'?"),
@@ -95,6 +97,18 @@ BAD = {
     "an unknown field": ("camera/fov", 3, "camera.fov", "Did you mean 'fov_deg'?"),
     "wide camera": ("camera/fov_deg", 180, "camera.fov_deg", "above 0 and below 180, got 180"),
     "no pixels": ("camera/width", 0, "camera.width", "a whole number from 1 to 16384, got 0"),
+    "an enormous edge": ("camera/height", 10**6, "camera.height", "a whole number from 1 to 16384, got 1000000"),
+    "an enormous image": (
+        "camera",
+        GOOD["camera"] | {"width": 16384, "height": 16384},
+        "camera.width",
+        "to be at most 16,777,216 rays, got 268,435,456. Lower the grid",
+    ),
+    "a place that is no number": ("camera/position", [float("nan"), 0, 1], "camera.position", "three finite numbers"),
+    "a size beyond arithmetic": ("objects/0/radius", 1e200, "objects[0].radius", "got 1e+200. Give it a size, up to"),
+    "a size that is no number": ("objects/0/radius", float("nan"), "objects[0].radius", "above 0, got nan"),
+    "a light that is no number": ("lights/0/radiance", float("nan"), "lights[0].radiance", "not negative, got nan"),
+    "a reflectance that is no number": ("objects/0/material", "lambert(kd=nan)", "objects[0].material", "kd"),
     "camera looks nowhere": ("camera/look_at", [3, 0, 1], "camera.look_at", "to differ from position"),
     "camera looks up": ("camera/look_at", [3, 0, 2], "camera.look_at", "and not along up"),
     "samples": ("samples", 0, "samples", "Expected samples to be a whole number from 1"),

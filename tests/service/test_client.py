@@ -1,5 +1,7 @@
 """The client, against the app without sockets, and alone where the service misbehaves."""
 
+import dataclasses
+import io
 import json
 import math
 import pathlib
@@ -390,6 +392,36 @@ def test_a_table_that_failed_or_is_not_made_is_an_exception() -> None:
         ):
             table.wait(timeout=0.01)
         assert table.cancel().job_status == "running"
+
+
+def test_a_scene_is_rendered_and_fetched(client: Client) -> None:
+    scene = bc.render.Scene.load("ashikhmin_shirley_figure_4")
+    scene = dataclasses.replace(scene, camera=dataclasses.replace(scene.camera, width=8, height=6))
+    told: list[float] = []
+    made = client.render(scene, tolerance=0.01, samples=4, progress=lambda now: told.append(now.fraction))
+    assert (made.job_status, told[-1], made.result.plan.tolerance) == ("succeeded", 1.0, 0.01)
+    assert made.image().startswith(b"\x89PNG")
+    assert np.load(io.BytesIO(made.image("npy"))).shape == (6, 8, 3)
+    assert client.get_render(made.id).result == made.result
+    assert repr(made) == f"RenderResult({made.id}, '{len(scene.objects)} objects', succeeded)"
+    made.delete()
+    with pytest.raises(ProblemError, match="Expected the id of a render"):
+        made.refresh()
+
+
+def test_a_sphere_has_the_colour_of_its_channels(client: Client) -> None:
+    red = "lambert(kd=[0.6, 0.1, 0.1])"
+    assert client.sphere(red, ["450", "550", "650"]) != client.sphere(red)
+    assert client.sphere(bc.material(red), size=32) == client.sphere(red, ["r", "g", "b"], 32)
+
+
+def test_a_render_that_is_not_made_is_an_exception() -> None:
+    request = {"scene": "kurt_figure_12", "tolerance": 1e-3, "samples": 4, "noise": None, "seed": 0}
+    with scripted(lambda _: httpx2.Response(202, json=fit_view("running", request=request))) as client:
+        running = client.render("kurt_figure_12", wait=False)
+        assert repr(running) == "RenderResult(f1, 'kurt_figure_12', running)"
+        with pytest.raises(JobUnfinishedError, match=r"Expected render f1 to have succeeded, but it is running\."):
+            _ = running.result
 
 
 def test_many_fits_at_once_keep_their_order(client: Client) -> None:

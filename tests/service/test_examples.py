@@ -27,8 +27,9 @@ def test_every_operation_has_an_example(http: TestClient) -> None:
 @pytest.mark.parametrize(("method", "path", "name"), SENT)
 def test_an_example_is_accepted(http: TestClient, method: str, path: str, name: str) -> None:
     body: Any = BODIES[method, path][name]
-    if path == "/v1/datasets":
-        assert http.request(method, path, content=body).status_code == 201
+    if path in ("/v1/datasets", "/v1/sphere"):
+        sent = {"content": body} if path == "/v1/datasets" else {"json": body}
+        assert http.request(method, path, **sent).status_code in (200, 201)  # no JSON
         return
     uploaded = http.post("/v1/datasets", content=csv_file(), params={"quantity": "brdf"}).json()["id"]
     if "dataset" in body:

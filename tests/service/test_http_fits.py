@@ -413,6 +413,14 @@ def test_openapi_has_every_route_and_its_errors(http: TestClient) -> None:
         "/v1/fits/{fit_id}/plots/residuals.svg": ["get"],
         "/v1/formats": ["get"],
         "/v1/models": ["get"],
+        "/v1/renders": ["get", "post"],
+        "/v1/renders/{render_id}": ["delete", "get"],
+        "/v1/renders/{render_id}/cancel": ["post"],
+        "/v1/renders/{render_id}/events": ["get"],
+        "/v1/renders/{render_id}/image.exr": ["get"],
+        "/v1/renders/{render_id}/image.npy": ["get"],
+        "/v1/renders/{render_id}/image.png": ["get"],
+        "/v1/sphere": ["post"],
     }
     submit = paths["/v1/fits"]["post"]
     assert "samples" in submit["requestBody"]["content"]["application/json"]["schema"]["properties"]

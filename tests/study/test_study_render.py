@@ -6,11 +6,12 @@ import pytest
 
 from brdfcore.study import STUDIES
 from brdfcore.study.render import FLOORS, WAYS, _sentence
+from brdfcore.study.report import to_dict, write
 
 
 @pytest.fixture(scope="module")
 def study():
-    return STUDIES["render"](size=5, counts=(8, 64), models=("lambert", "ward_bounded"))
+    return STUDIES["render"](quick=True, size=5, counts=(8, 64), models=("lambert", "ward_bounded"))
 
 
 def test_noise_falls_with_the_samples(study) -> None:
@@ -32,6 +33,36 @@ def test_effects_and_models_have_their_rows(study) -> None:
     assert even[1] < 1e-6 < skewed[1] < 0.5
     assert even[2] is None or even[2] > 100
     assert skewed[2] == pytest.approx(20 * math.log10(1 / skewed[1]), abs=15)
+
+
+def test_the_papers_images_are_what_the_papers_say(study) -> None:
+    """Uniform weights are off at grazing angles, right ones only noisy; Kurt's model is nearer than Ward-Duer's."""
+    error = {(case, what): numbers[1] for case, what, _, *numbers in study.rows}
+    assert error["G-M&D Fig. 2", "samples, uniform weights"] > 2 * error["G-M&D Fig. 2", "direct"]
+    assert error["fitted table", "the metal itself"] < error["fitted table", "Kurt"]
+    names = [what for case, what, *_ in study.rows if case == "fitted table"]
+    assert names == sorted(names, key=lambda name: error["fitted table", name])
+    assert [picture.name for picture in study.pictures] == [
+        "render-2-luminance",
+        "render-8-luminance",
+        "render-fitted",
+        "render-samples",
+    ]
+
+
+def test_pictures_are_written(study, tmp_path) -> None:
+    names = {path.name for path in write(study, tmp_path)}
+    assert {f"{picture.name}.svg" for picture in study.pictures} < names
+    assert "Kurt Fig. 9" in (tmp_path / "render-fitted.svg").read_text()
+    assert to_dict(study)["pictures"][0] == {"name": "render-2-luminance", "title": study.pictures[0].title}
+
+
+def test_variances_are_of_a_sample(study) -> None:
+    """Whatever their number, and the errors are theirs."""
+    (few, many), *_ = ([n for c, what, *n in study.rows if (c, what) == ("a narrow lobe", way)] for way in WAYS)
+    assert few[0] < many[0]
+    assert many[2] == pytest.approx(math.sqrt(many[-1] / many[0]), rel=0.5)
+    assert few[-1] == pytest.approx(many[-1], rel=0.5)
 
 
 def test_the_sentence_is_computed() -> None:

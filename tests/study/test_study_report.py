@@ -42,7 +42,17 @@ def test_text_holds_the_table_the_sentence_and_the_notes() -> None:
 
 def test_json_has_this_schema_and_no_number_that_json_lacks() -> None:
     data = json.loads(json.dumps(report.to_dict(STUDY), allow_nan=False))
-    assert list(data) == ["study", "question", "sentence", "notes", "columns", "rows", "plots", "provenance"]
+    assert list(data) == [
+        "study",
+        "question",
+        "sentence",
+        "notes",
+        "columns",
+        "rows",
+        "plots",
+        "pictures",
+        "provenance",
+    ]
     assert data["rows"] == [["fast", 0.001234, True], ["slow", None, None]]
     assert list(data["plots"][0]) == ["name", "title", "kind", "x", "y", "panels"]
     assert data["plots"][0]["panels"] == [
