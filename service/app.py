@@ -83,7 +83,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             if reason:
                 metrics.failed(job.kind, reason)
             else:
-                model = json.loads(job.request).get("model", "")
+                request = json.loads(job.request)
+                model = request.get("model") or ("several" if request.get("models") else "")
                 metrics.succeeded(job.kind, model, (job.finished or 0.0) - (job.started or 0.0))
 
         dispatcher = Dispatcher(

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from .. import renders
-from ..errors import ProblemError, inlined, responses
+from ..errors import WRITES, ProblemError, inlined, responses
 from ..jobs.records import Job
 from ..schemas import RenderOutcome, RenderPage, RenderRequest, RenderSummary, RenderView
 from ..state import State, state
@@ -30,7 +30,10 @@ _BODY = {"required": True, "content": {"application/json": {"schema": inlined(Re
     "",
     dependencies=_JSON,
     status_code=202,
-    responses={200: {"model": RenderView, "description": "finished"}, **responses(406, 408, 409, 413, 415, 422, 429)},
+    responses={
+        200: {"model": RenderView, "description": "finished"},
+        **responses(406, 408, 409, 413, 415, 422, 429, *WRITES),
+    },
     openapi_extra={"requestBody": _BODY},
 )
 async def submit(request: Request, response: Response) -> RenderView:
@@ -76,13 +79,13 @@ async def image_exr(request: Request, render_id: str) -> Response:
     return await _image(request, render_id, "exr")
 
 
-@router.post("/{render_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 409, 422))
+@router.post("/{render_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 409, 422, *WRITES))
 async def cancel(request: Request, render_id: str) -> RenderView:
     """Cancel a render that is queued or running; its process ends at once."""
     return RenderView(**_jobs.view(await _jobs.cancelled(state(request), "render", render_id)))
 
 
-@router.delete("/{render_id}", dependencies=_JSON, status_code=204, responses=responses(404, 406, 422))
+@router.delete("/{render_id}", dependencies=_JSON, status_code=204, responses=responses(404, 406, 422, *WRITES))
 async def remove(request: Request, render_id: str) -> None:
     """Remove a render and its image for good, cancelling it first where it is not finished."""
     service = state(request)

@@ -38,7 +38,7 @@ def server(data: pathlib.Path, workers: int = 1) -> Iterator[tuple[subprocess.Po
         )
     try:
         with Client(f"http://127.0.0.1:{port}") as client:
-            end = time.monotonic() + 30
+            end = time.monotonic() + 60
             while True:
                 assert process.poll() is None, (data.parent / "server.log").read_text()
                 with contextlib.suppress(ClientError):
@@ -79,7 +79,7 @@ def until_empty(leader: int, seconds: float) -> None:
         time.sleep(0.01)
 
 
-def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
+def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "waited for too long"

@@ -9,11 +9,12 @@ import sys
 import threading
 import time
 import types
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 import service_attempts as attempts
 from service_cases import measured_diffuser
+from service_process import until
 
 from service.jobs.dispatcher import Dispatcher
 from service.jobs.records import Attempt, Job
@@ -40,13 +41,6 @@ def dispatching(
     finally:
         dispatcher.stop()
         assert not dispatcher.alive
-
-
-def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited for too long"
-        time.sleep(0.01)
 
 
 def ended(store: JobStore, job: Job) -> Job:

@@ -156,17 +156,19 @@ def test_an_exception_is_one_json_line_too() -> None:
 
 def test_metrics_count_requests_jobs_and_failures(http: TestClient, request_body: dict[str, Any]) -> None:
     http.post("/v1/fits", json=request_body, headers={"prefer": "wait=20"})
+    http.post("/v1/fits", json=request_body | {"model": None, "models": ["lambert"]}, headers={"prefer": "wait=20"})
     steep = request_body | {"max_theta_deg": 0.01}
     failed = http.post("/v1/fits", json=steep, headers={"prefer": "wait=20"}).json()
     assert failed["status"] == "failed"
     text = http.get("/metrics").text
     for line in (
-        'brdf_jobs{kind="fit",status="succeeded"} 1.0',
+        'brdf_jobs{kind="fit",status="succeeded"} 2.0',
         'brdf_jobs{kind="fit",status="failed"} 1.0',
         "brdf_queue_depth 0.0",
         'brdf_job_seconds_count{kind="fit",model="lambert"} 1.0',
+        'brdf_job_seconds_count{kind="fit",model="several"} 1.0',
         'brdf_job_failures_total{kind="fit",reason="data"} 1.0',
-        'brdf_request_seconds_count{method="POST",route="/v1/fits",status="200"} 2.0',
+        'brdf_request_seconds_count{method="POST",route="/v1/fits",status="200"} 3.0',
     ):
         assert line in text, line
 
