@@ -23,6 +23,7 @@ def test_two_thousand_generated_requests_find_nothing(tmp_path: pathlib.Path) ->
     config.write_text(CONFIG)
     with background(Settings(data=tmp_path / "data", port=0, workers=1, fit_seconds=20)) as url:
         options = ["--checks", "all", "--max-examples", "25", "--seed", "1", "--suppress-health-check", "all"]
+        options += ["--max-response-time", "60"]  # test_bars.py measures times; here other work may slow the machine
         command = [str(SCHEMATHESIS), "--config-file", str(config), "run", f"{url}/openapi.json", *options]
         ran = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=1500)
     assert ran.returncode == 0, ran.stdout[-5000:]
