@@ -60,7 +60,6 @@ export function colours() {
  */
 export async function draw(element, traces, layout) {
   const library = await plotly();
-  await new Promise((done) => setTimeout(done)); // figures that are drawn together do not make one long stall
   const { ink, soft, line } = colours();
   const axis = { gridcolor: line, linecolor: soft, zerolinecolor: line, tickfont: { color: soft, size: 12 } };
   const whole = {
@@ -71,6 +70,7 @@ export async function draw(element, traces, layout) {
     if (layout[name]) whole[name] = { ...axis, ...layout[name], title: { font: { size: 13 }, standoff: 8, ...layout[name].title } };
   }
   await library.react(element, traces, whole, { displayModeBar: false, responsive: true });
+  await new Promise((done) => setTimeout(done)); // figures that are drawn together do not make one long stall
 }
 
 /**

@@ -27,6 +27,7 @@ export function install() {
   on("samples", whole);
   on("view", () => { lobes(); against(); });
   on("values", () => { lobes(); against(); });
+  new ResizeObserver(lobes).observe(at("polar")); // it is drawn for its size
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { lobes(); against(); paint(); });
 }
 

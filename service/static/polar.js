@@ -7,6 +7,7 @@ import { radius, rings } from "./scale.js";
 import { state } from "./state.js";
 
 const SPOKES = [-90, -60, -30, 0, 30, 60, 90]; // degrees
+const MARGIN = { l: 8, r: 8, t: 6, b: 18 }; // pixels
 const NEAR = 3; // a measured point is drawn where its light is so close to the one chosen [degrees]
 
 /** @typedef {{name: string, angles: number[], f: (number | null)[], chosen: boolean}} Curve */
@@ -35,17 +36,27 @@ export async function drawPolar(curves) {
     marker: { size: 6.5, color: "rgba(0,0,0,0)", line: { color: ink, width: 1.4 } },
     hovertemplate: "%{customdata:.1f}°: %{text} 1/sr<extra>measured</extra>",
   };
-  const word = { showarrow: false, font: { color: soft, size: 11.5 } };
-  const beside = SPOKES.map((angle) => ({ ...word, ...spot(angle, 1.09), text: `${Math.abs(angle)}°`, yshift: Math.abs(angle) === 90 ? 6 : 0 }));
-  const below = tickvals.map((value, k) => ({ ...word, x: value, y: 0, yanchor: "top", text: ticktext[k] }));
-  const axis = { visible: false, fixedrange: true, constrain: "domain" };
-  await draw(at("polar"), [{ ...plain, ...grid(tickvals), line: { color: line, width: 1 } }, light, ...traces, dots], {
-    margin: { l: 8, r: 8, t: 6, b: 18 },
-    xaxis: { ...axis, range: [-1.17, 1.17] }, yaxis: { ...axis, range: [0, 1.16], scaleanchor: "x" },
-    annotations: [...beside, ...below],
+  // one trace of words: annotations take plotly longer than all curves
+  const words = {
+    type: "scatter", mode: "text", hoverinfo: "skip", cliponaxis: false, textfont: { color: soft, size: 11.5 },
+    ...placed([...SPOKES, ...tickvals.map(() => 90)], [...SPOKES.map(() => 1.09), ...tickvals]),
+    text: [...SPOKES.map((angle) => `${Math.abs(angle)}°`), ...ticktext],
+    textposition: [...SPOKES.map((angle) => (Math.abs(angle) === 90 ? "top center" : "middle center")), ...tickvals.map(() => "bottom center")],
+  };
+  const axis = { visible: false, fixedrange: true };
+  const { x, y } = ranges(at("polar"));
+  await draw(at("polar"), [{ ...plain, ...grid(tickvals), line: { color: line, width: 1 } }, words, light, ...traces, dots], {
+    margin: MARGIN, xaxis: { ...axis, range: x }, yaxis: { ...axis, range: y },
   });
   at("polar-title").textContent = `In the plane of incidence, light at ${shown(state.theta)}°`
     + (points.length ? `: ${points.length} measured` : state.samples ? ": none measured" : "");
+}
+
+/** What both axes show, so that a unit is as long on both. @param {HTMLElement} element */
+function ranges(element) {
+  const [wide, high] = [element.clientWidth - MARGIN.l - MARGIN.r, element.clientHeight - MARGIN.t - MARGIN.b];
+  const unit = Math.max(Math.min(wide / 2.34, high / 1.16), 1); // pixels
+  return { x: [-wide / unit / 2, wide / unit / 2], y: [0, high / unit] };
 }
 
 /** The point at an angle from the normal, which points up; a positive one is to the right. @param {number} angle @param {number} radius */

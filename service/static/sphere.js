@@ -14,7 +14,7 @@ const MOST = 200; // pictures that are kept
 const known = new Map();
 
 const all = latest(30, drawAll, (error) => complain("result-error", error));
-const own = latest(30, drawOwn, (error) => complain("look-error", error));
+const own = latest(150, drawOwn, (error) => complain("look-error", error));
 
 /** Draw whenever there are other fits, another channel or other values. */
 export function install() {
