@@ -19,7 +19,7 @@ from torch import Tensor
 from ..geometry import geometry
 from ..models import Model
 from ..parameters import Values
-from .refinement import Refined, Rows, take
+from .refinement import LEAST_WEIGHT, Refined, Rows, take
 from .rules import gauss
 
 ORDER = 8  # nodes along a side of a cell
@@ -104,7 +104,7 @@ class Hemisphere:
             return self._solve(weights.expand(len(self.rows.co), -1, -1), tolerance)
 
     def _solve(self, weights: Tensor, tolerance: float) -> Refined:
-        count, device = len(self.rows.co), self.rows.co.device
+        count, device, heeded = len(self.rows.co), self.rows.co.device, weights.clamp(min=LEAST_WEIGHT)
         steps = torch.arange(FIRST, dtype=torch.float64, device=device) / FIRST
         corner = torch.cartesian_prod(steps, steps).repeat(count, 1)
         row = torch.arange(count, device=device).repeat_interleave(FIRST**2)
@@ -128,9 +128,9 @@ class Hemisphere:
                 for x in (kept, SAFETY * difference, scale)
             )
             allowed = tolerance * (weights * total.abs()).sum(1).clamp(min=1)
-            open_ = ((weights * error).sum(1) > allowed).any(1) & (nodes < MOST)
+            open_ = ((heeded * error).sum(1) > allowed).any(1) & (nodes < MOST)
             many = torch.bincount(leaves.row, minlength=count)[leaves.row, None]
-            share = SAFETY * (weights[leaves.row] * difference).sum(1) * many
+            share = SAFETY * (heeded[leaves.row] * difference).sum(1) * many
             coarse = open_[leaves.row] & (share > 0.5 * allowed[leaves.row]).any(1)
             if not bool(coarse.any()):
                 break

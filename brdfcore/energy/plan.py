@@ -50,7 +50,6 @@ NEGLECTED = 1e-4  # of the tolerance, outside of the nodes' reach
 LEAST_NEGLECTED = 3e-17  # a rounding
 ROUNDING = 4e-15  # of a closed form
 SINGLE_SHARE = 0.98  # of the tolerance, for what a rule integrates; what is returned beside it is wrong by the rest
-LEAST_WEIGHT = 0.1  # of a basis with a smaller coefficient: the derivative by a reflectance needs its integral, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +196,7 @@ def _planned(
     kind = SINGLE[model.name] if method == "closed_form" else RULES[method]
     rule = kind(lobe, own, rows, max(NEGLECTED * tolerance, LEAST_NEGLECTED))
     weights = torch.stack(torch.broadcast_tensors(*(c.abs() for c in coefficients)), dim=1)
-    found = rule.solve(weights.clamp(min=LEAST_WEIGHT), SINGLE_SHARE * tolerance)
+    found = rule.solve(weights, SINGLE_SHARE * tolerance)
     part = _Part(term, method, rows, rule, tolerance)
     returned_albedo, returned_error = part.returned(own)
     claimed = (torch.where(c == 0, 0.0, c.abs() * e) for c, e in zip(coefficients, found.error.unbind(1), strict=True))

@@ -29,6 +29,7 @@ ROUNDING = 1e-15  # of the integral of absolute values
 MARGIN = 10.0  # by which a spectrum should have fallen below what is wanted
 LEAP = 4  # steps of the ladder, twice the size: spectra foretell no more
 ROUNDS = 40
+LEAST_WEIGHT = 0.1  # of an error: the derivative by a reflectance needs the integral of a small coefficient, too
 NODES = 2**14  # at a time: a few quantities of so many nodes stay in the processor's cache
 REMEMBERED = 2**19  # nodes whose intermediate results are kept for a derivative
 OVERHEAD = 20_000  # nodes that could have been evaluated in the time that one more call takes
@@ -139,7 +140,8 @@ class Refined:
 def refined(integral: Integral, weights: Tensor, tolerance: float) -> Refined:
     """The integrals to the tolerance: sum_k weights_k error_k <= tolerance max(1, sum_k weights_k bases_k).
 
-    weights (R or 1, K, 1 or C) >= 0. Where rounding or the ladder's end forbids it, as near as that allows.
+    weights (R or 1, K, 1 or C) >= 0; on the left a small one counts as LEAST_WEIGHT. Where rounding or the ladder's end
+    forbids it, as near as that allows.
     """
     with torch.no_grad():
         search = _Search(integral, weights.detach().expand(len(integral.rows.co), -1, -1), tolerance)
@@ -235,7 +237,7 @@ class _Search:
         """The worst over the channels of what the bases' amounts add up to, by what is tolerable, (r,)."""
         weights = self.weights[rows]
         tolerable = self.tolerance * (weights * bases.abs()).sum(1).clamp(min=1)
-        return ((weights * amounts).sum(1) / tolerable).amax(-1)
+        return ((weights.clamp(min=LEAST_WEIGHT) * amounts).sum(1) / tolerable).amax(-1)
 
     def _wanted(self, sums: Sums, rows: Tensor, steps: Tensor) -> Tensor:
         """The steps that the spectra call for if they go on falling as they do, at least one more than the present."""

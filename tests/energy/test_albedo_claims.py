@@ -10,6 +10,8 @@ import pytest
 import torch
 from albedo_cases import CHOICES, FLOOR, random_case
 
+import brdfcore as bc
+
 SEED = 20100629
 DIRECTIONS = 4
 REFERENCE = 1e-13
@@ -67,3 +69,11 @@ def test_a_reference_to_1e_12_is_within_reach(count: int):
         if bool(bad.any()):
             missed.append((case, found.error[bad].tolist()))
     assert not missed
+
+
+def test_a_small_coefficient_takes_nothing_of_the_tolerance():
+    """The tolerance is of the albedo: a basis of 719 whose coefficient is small must not stand in for it."""
+    material = bc.material("kurt(isotropic, schlick, ks=0.6078, f0=0.0124, m=1.9011, alpha=0.7742)")
+    theta = torch.acos(torch.tensor([1.5932e-4], dtype=torch.float64))
+    found = bc.albedo(material, theta, 3.1282, 1e-12)
+    assert found.met, f"{float(found.error.detach()):.2e} of {float(found.values.detach()):.4g}"
