@@ -2,12 +2,13 @@
 
 A richer material stays only if incidences that were left out are foretold better (held_out.py) and the information
 criterion falls (criterion.py). "auto" climbs from Lambert's term: each effect that is not there yet is tried in turn,
-again and again until none is called for, at last all that are left at once, for two crossed lobes show only together;
-then each is left out in turn, the diffuse term too (effects.py). A list is walked in the order of its numbers of free
-values. All rungs see the same samples and the same folds, and each starts from where the last one that stayed ended,
-beside its own scan.
+again and again until none is called for, at last all that are left at once, for two crossed lobes show only together,
+and a lobe may only with its Fresnel factor; then each is left out in turn, the diffuse term too (effects.py). A list
+is walked in the order of its numbers of free values. All rungs see the same samples and the same folds, and each
+starts from where the last one that stayed ended, beside its own scan.
 """
 
+import functools
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -195,7 +196,25 @@ def _absent(effects: Effects, *, observed: bool) -> list[str]:
 
 
 def _richer(ladder: _Ladder, effects: Effects, current: _Tried, *, observed: bool) -> tuple[Effects, _Tried]:
-    """Effects added until a round of all adds none."""
+    """Effects added until a round of all adds none, nor all that are left at once."""
+    while True:
+        effects, current = _one_by_one(ladder, effects, current, observed=observed)
+        left = _absent(replace(effects, lobes=max(1, effects.lobes)), observed=observed)
+        if not effects.lobes:
+            left = ["lobe", *(effect for effect in left if effect != "second lobe")]
+        richer = functools.reduce(lambda some, effect: some.plus(effect) or some, left, effects)
+        if len(left) < 2 or richer.text() in ladder.known:
+            return effects, current
+        one = ladder.tried(richer.text(), richer.near(current.numbers()))
+        stays, criterion, sentence = ladder.called_for(one, current)
+        ladder.note(" + ".join(left), one, criterion, kept=stays, reason=f"With all {sentence}: {_verdict(stays)}.")
+        if not stays:
+            return effects, current
+        effects, current = richer, one
+
+
+def _one_by_one(ladder: _Ladder, effects: Effects, current: _Tried, *, observed: bool) -> tuple[Effects, _Tried]:
+    """Effects added one at a time until a round of all adds none."""
     grown = True
     while grown:
         grown = False
@@ -208,14 +227,6 @@ def _richer(ladder: _Ladder, effects: Effects, current: _Tried, *, observed: boo
             ladder.note(effect, one, criterion, kept=stays, reason=f"With it {sentence}: {_verdict(stays)}.")
             if stays:
                 effects, current, grown = richer, one, True
-    left = _absent(effects, observed=observed)
-    richer = replace(effects, lobes=2, fresnel="Fresnel" in left or effects.fresnel, anisotropic=observed)
-    if effects.lobes and len(left) > 1 and richer.text() not in ladder.known:
-        one = ladder.tried(richer.text(), richer.near(current.numbers()))
-        stays, criterion, sentence = ladder.called_for(one, current)
-        ladder.note(" + ".join(left), one, criterion, kept=stays, reason=f"With all {sentence}: {_verdict(stays)}.")
-        if stays:
-            return richer, one
     return effects, current
 
 

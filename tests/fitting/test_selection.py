@@ -2,6 +2,7 @@
 
 import functools
 import json
+import pathlib
 import time
 from collections import Counter
 
@@ -99,7 +100,7 @@ def test_matte_data_are_quick_and_never_see_a_lobe_in_the_end(channels: int) -> 
     fit = bc.fit(samples, "auto")
     assert time.perf_counter() - begun < 2
     assert [term.label for term in fit.form.terms] == ["lambert"]
-    assert [rung.effect for rung in fit.ladder] == ["diffuse", "lobe"]
+    assert [rung.effect for rung in fit.ladder] == ["diffuse", "lobe", "lobe + Fresnel"]
 
 
 def test_the_ladder_is_in_the_result_and_says_why_it_stopped() -> None:
@@ -234,3 +235,13 @@ def test_the_shape_is_chosen_last() -> None:
     assert fit.chi_square is not None
     assert fit.chi_square[0] < 1.2 * fit.chi_square[1]
     assert [rung.kept for rung in fit.ladder if rung.effect == "ward_bounded's shape"] == [True]
+
+
+def test_a_lobe_that_shows_only_with_its_fresnel_factor_is_found(measured: pathlib.Path) -> None:
+    """A dark paint that is bright at grazing angles: neither of both is called for alone."""
+    paint = bc.read(measured / "cornell" / "garnet_red.brdf", quantity="brdf").to_rgb()
+    fit = bc.fit(paint.subset(torch.arange(0, len(paint), 2)), "auto")
+    tried = {rung.effect: rung for rung in fit.ladder}
+    assert not tried["lobe"].kept
+    assert tried["lobe + Fresnel"].kept
+    assert fit.errors["cosine_rms"] < 0.2 * tried["diffuse"].error
