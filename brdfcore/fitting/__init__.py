@@ -3,13 +3,13 @@
 from ._fit import Progress, fit
 from .asked import check
 from .batch import fit_batch
+from .every_error import errors
 from .losses import LOSSES
 from .plan import OPTIMIZERS
 from .result import Cost, Fit
 from .robust import ROBUST
 from .rung import Rung
 from .support import Support, supports
-from .worth import errors
 
 __all__ = [
     "LOSSES",

@@ -82,7 +82,11 @@ class Columns:
                 out[:, :, k + i] = torch.atleast_2d(column).mT
             for i, column in enumerate(slopes):
                 out[:, :, j + i] = torch.atleast_2d(column).mT
-            k, j = k + len(bases), j + len(slopes)
+            if one.schlick:
+                s, more = schlick(g.h_dot_wo)[:, 0], len(slopes)
+                torch.mul(out[:, :, k], s, out=out[:, :, k + 1])
+                torch.mul(out[:, :, j : j + more], s, out=out[:, :, j + more : j + 2 * more])
+            k, j = k + len(one.reads), j + sum(map(len, one.reads))
         return out
 
     def coefficients(self, natural: Natural, shape: tuple[int, ...]) -> Tensor:
@@ -150,20 +154,17 @@ class _TermColumns:
     def derived(
         self, form: Form, natural: Natural, g: Geometry, shape: tuple[int, ...]
     ) -> tuple[list[Tensor], list[Tensor]]:
-        """The bases and their derivatives, each (S, N, W) or broadcasting to it."""
+        """The bases and their derivatives, each (S, N, W) or broadcasting to it; of the lobe alone before Schlick's."""
         if self.explicit is None and any(self.reads):
             bases, slopes = self._by_backward_passes(form, natural, g, shape)
         else:
             own = form.of_term(self.term, natural)
             with torch.no_grad():
                 if self.explicit is None:
-                    return self.bases(own, g), []
+                    return self.bases(own, g)[: 1 if self.schlick else None], []
                 lobe = cast(Lobe, self.term.model).lobe(own, g)
                 by = cast(WidthLobe, self.term.model).log_slopes(own, g)
-                bases, slopes = [lobe], [lobe * by[name] for name in self.explicit]
-        if self.schlick:
-            s = schlick(g.h_dot_wo)
-            bases, slopes = [*bases, bases[0] * s], [*slopes, *(slope * s for slope in slopes)]
+                return [lobe], [lobe * by[name] for name in self.explicit]
         return bases, slopes
 
     def _by_backward_passes(

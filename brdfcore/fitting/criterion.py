@@ -50,7 +50,7 @@ def spread(problem: Problem, x: Tensor) -> Spread:
         squares.append(r[counted].square())
         leverage.append((columns * (own @ columns)).sum(2)[counted])
         signal.append((slope * problem.f(x, piece))[counted])
-    unit = float(problem.squares()[0]) / max(1, sum(map(len, squares)))
+    unit = float(problem.squares[0]) / max(1, sum(map(len, squares)))
     return Spread(torch.cat(squares), torch.cat(leverage), torch.cat(signal), unit, problem.size)
 
 

@@ -10,7 +10,9 @@ from ..formats.samples import Samples
 from ..geometry import Geometry, geometry
 from .losses import Loss, Scales
 
+Rows = slice
 _CHUNK = 32768  # samples times starts of one piece: what a basis computes on the way stays in the cache
+_FEWEST = 8  # starts of one piece, where there are as many: they share what the directions decide
 
 
 @dataclass(frozen=True)
@@ -57,9 +59,9 @@ class Data:
         return Data(
             self.g,
             self.c,
-            self.y[which],
-            self.root_weight if len(self.root_weight) == 1 else self.root_weight[which],
-            None if self.sigma is None else self.sigma[which],
+            self.y.index_select(0, which),
+            self.root_weight if len(self.root_weight) == 1 else self.root_weight.index_select(0, which),
+            None if self.sigma is None else self.sigma.index_select(0, which),
             self.scales.rows(which),
         )
 
@@ -73,6 +75,17 @@ class Data:
         step = max(1, _CHUNK // max(1, starts))
         for begin in range(0, count, step):
             yield begin, self.slice(begin, min(begin + step, count)) if step < count else self
+
+    def blocks(self, starts: int, width: int = 1) -> Iterator[tuple[Rows, int, "Data"]]:
+        """Which of the starts, the first sample and the piece, so that all of it is small where a start counts `width`.
+
+        Starts are parted before samples: sums over many samples at once cost least.
+        """
+        rows = max(1, min(starts, max(_FEWEST, _CHUNK // len(self.c)) // width))
+        for first in range(0, starts, rows):
+            at = slice(first, min(first + rows, starts))
+            for begin, piece in self.places((at.stop - at.start) * width):
+                yield at, begin, piece
 
 
 def _alike(several: Sequence[Tensor]) -> Tensor:

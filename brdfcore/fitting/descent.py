@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from .levenberg_marquardt import DECREMENT, Outcome, decrement
+from .levenberg_marquardt import DECREMENT, Outcome, decrement, solve_free
 from .problem import Gram, Problem
 
 _NEARLY = 1e-8  # of the loss: a gradient method that comes this near has converged (6 digits of the optimum)
@@ -31,7 +31,7 @@ class Scaled:
         """The scaling that the curvature at x (D,) asks for."""
         gram = problem.gram(x.unsqueeze(0), which)
         diagonal = gram.matrix[0].diagonal()
-        unit = float(problem.squares()[0 if which is None else int(which)]) or 1.0
+        unit = float(problem.squares[0 if which is None else int(which)]) or 1.0
         typical = diagonal.max().clamp(min=1e-300)
         return cls(problem, which, x, (unit / diagonal.clamp(min=1e-8 * typical)).sqrt(), unit)
 
@@ -57,7 +57,8 @@ class Scaled:
         """Whether the Gauss-Newton decrement shows that little is left to gain."""
         gram = self.gram(z)
         held = self.problem.held(self.x(z.detach()).unsqueeze(0), gram.gradient)
-        return bool(decrement(gram, held) <= max(_NEARLY, DECREMENT) * gram.loss)
+        undamped = solve_free(gram, held, torch.zeros_like(gram.loss))
+        return bool(decrement(gram, undamped) <= max(_NEARLY, DECREMENT) * gram.loss)
 
     def outcome(self, z: Tensor, iterations: int) -> Outcome:
         """Where z ended, with the convergence that the decrement there shows."""

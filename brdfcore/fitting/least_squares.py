@@ -21,6 +21,6 @@ def least_squares(
     def evaluate(x: Tensor, rows: Tensor) -> tuple[Tensor, Gram]:
         return x, problem.gram(x, None if which is None else which[rows])
 
-    floor = _ROUNDING * problem.squares()
+    floor = _ROUNDING * problem.squares
     floor = floor.expand(len(x)) if which is None else floor[which]
     return levenberg_marquardt(problem, evaluate, x, floor, tolerance, max_iterations, on_step)

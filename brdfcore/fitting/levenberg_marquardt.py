@@ -33,11 +33,12 @@ class Outcome(NamedTuple):
 
     def pick(self, index: Tensor) -> "Outcome":
         """The rows of an index."""
-        return Outcome(self.x[index], self.loss[index], self.converged[index], self.iterations)
+        gram = None if self.gram is None else self.gram.pick(index)
+        return Outcome(self.x[index], self.loss[index], self.converged[index], self.iterations, gram)
 
 
 def solve_free(gram: Gram, held: Tensor, damping: Tensor) -> Tensor:
-    """The damped step (S, D), 0 for held values; values that the data do not reach stay where they are."""
+    """The steps (..., S, D) for a damping (..., S), 0 for held values and for those that the data do not reach."""
     diagonal = gram.matrix.diagonal(dim1=-2, dim2=-1)
     free = ~held & (diagonal > 0)
     scale = torch.where(free, diagonal.clamp(min=1e-300).rsqrt(), 0.0)
@@ -48,10 +49,9 @@ def solve_free(gram: Gram, held: Tensor, damping: Tensor) -> Tensor:
     return torch.mul(scale, step.squeeze(-1))
 
 
-def decrement(gram: Gram, held: Tensor) -> Tensor:
-    """g^T (J^T J)^-1 g over the values that are not held, (S,), in the loss's unit."""
-    step = solve_free(gram, held, torch.zeros(len(held), dtype=torch.float64))
-    return -(step * gram.gradient).sum(-1)
+def decrement(gram: Gram, undamped: Tensor) -> Tensor:
+    """g^T (J^T J)^-1 g over the values that are not held, (S,), in the loss's unit, from their undamped step."""
+    return -(undamped * gram.gradient).sum(-1)
 
 
 def levenberg_marquardt(
@@ -62,26 +62,33 @@ def levenberg_marquardt(
     tolerance: float = DECREMENT,
     max_iterations: int = 200,
     on_step: OnStep | None = None,
+    known: Gram | None = None,
 ) -> Outcome:
-    """The optimum that each row x (S, D) leads to; a loss below the floor (S,) is rounding."""
-    x, gram = evaluate(x.clamp(problem.low, problem.high), torch.arange(len(x)))
-    gram = Gram(*(part.clone() for part in gram))
+    """The optimum that each row x (S, D) leads to; a loss below the floor (S,) is rounding.
+
+    `known` are the equations at x, where `evaluate` has been there.
+    """
+    if known is None:
+        x, known = evaluate(x.clamp(problem.low, problem.high), torch.arange(len(x)))
+    x, gram = x.clone(), Gram(*(part.clone() for part in known))
     damping = torch.full((len(x),), 1e-3, dtype=torch.float64)
     growth = torch.full_like(damping, 2.0)
     converged = torch.zeros(len(x), dtype=torch.bool)
     active = torch.arange(len(x))
     done = 0
     for done in range(1, max_iterations + 1):
-        here = Gram(*(part[active] for part in gram))
-        held = problem.held(x[active], here.gradient)
-        ended = (decrement(here, held) <= tolerance * here.loss + 0.01 * floor[active]) | (here.loss <= floor[active])
+        here, old, eager, least = gram.pick(active), x[active], damping[active], floor[active]
+        held = problem.held(old, here.gradient)
+        undamped, step = solve_free(here, held, torch.stack([torch.zeros_like(eager), eager]))
+        enough = tolerance * here.loss + 0.01 * least
+        ended = (decrement(here, undamped) <= enough) | (here.loss <= least)
         converged[active] = ended
-        going = ~ended & (damping[active] <= _LAMBDA_LIMIT)
-        active, held, here = active[going], held[going], Gram(*(part[going] for part in here))
-        if not len(active):
-            break
-        old = x[active]
-        trial = (old + solve_free(here, held, damping[active])).clamp(problem.low, problem.high)
+        going = ~ended & (eager <= _LAMBDA_LIMIT)
+        if not bool(going.all()):
+            active, here, old, eager, step = active[going], here.pick(going), old[going], eager[going], step[going]
+            if not active.numel():
+                break
+        trial = (old + step).clamp(problem.low, problem.high)
         step = trial - old
         predicted = -(
             2 * (step * here.gradient).sum(-1) + (step * (here.matrix @ step.unsqueeze(-1)).squeeze(-1)).sum(-1)
@@ -90,9 +97,9 @@ def levenberg_marquardt(
         better = (new.loss < here.loss) & new.loss.isfinite()
         ratio = torch.where(better, (here.loss - new.loss) / predicted.clamp(min=1e-300), 0.0)
         shrink = torch.clamp(1 - (2 * ratio.clamp(max=2) - 1) ** 3, min=1 / 3)
-        eased = (damping[active] * shrink).clamp(min=1e-15)
-        damping[active] = torch.where(better, eased, damping[active] * growth[active]).clamp(max=1e16)
-        growth[active] = torch.where(better, 2.0, growth[active] * 2)
+        slower = growth[active]
+        damping[active] = torch.where(better, (eager * shrink).clamp(min=1e-15), eager * slower).clamp(max=1e16)
+        growth[active] = torch.where(better, 2.0, slower * 2)
         moved = active[better]
         x[moved] = trial[better]
         for part, found in zip(gram, new, strict=True):

@@ -46,6 +46,11 @@ def _median(x: Tensor) -> Tensor:
     return torch.where(found.isnan(), 1.0, found)
 
 
+def root_mean(total: Tensor, weight: Tensor, channels: int) -> Tensor:
+    """The root of the weighted mean with these sums (M,), for weights (M, 1, N) of each of so many channels, (M,)."""
+    return (total / (weight.sum((1, 2)) * channels)).sqrt()
+
+
 Difference = Callable[[Tensor, Tensor, Tensor, Scales], Tensor]
 Factor = Callable[[Tensor, Tensor, Scales], Tensor]
 

@@ -48,31 +48,33 @@ def noise(problem: Problem, x: Tensor, inverse: Tensor, which: Tensor, reach: Te
     even, even_squared = torch.zeros_like(x), torch.zeros_like(x)
     unknown = torch.zeros_like(x, dtype=torch.bool)
     known = is_known(problem)
-    for piece in problem.data.chunks(problem.channels * len(x)):
-        data = piece.rows(which)
-        residuals, columns, slope = problem.jacobian(x, data, which)  # (M, C, N), (M, C, P, N), (M, C, N)
+    for at, _, piece in problem.data.blocks(len(x), problem.channels):
+        data = piece.rows(which[at])
+        residuals, columns, slope = problem.jacobian(x[at], data, which[at])  # (M, C, N), (M, C, P, N), (M, C, N)
         if known and data.sigma is not None:
-            total += (columns * (slope * data.sigma).square().unsqueeze(2)) @ columns.mT
+            total[at] += (columns * (slope * data.sigma).square().unsqueeze(2)) @ columns.mT
             continue
-        left = 1 - (columns * (own @ columns)).sum(2)
-        spread = (residuals / left.clamp(min=_ALONE)).square()
+        left = 1 - (own[at] @ columns).mul_(columns).sum(2)
+        least = float(left.min())
+        spread = residuals.div(left if least > _ALONE else left.clamp(min=_ALONE)).square_()
         seen, mild = left > _ALONE, left >= 0.5
-        here = (columns * torch.where(seen, spread, 0.0).unsqueeze(2)) @ columns.mT
-        total += here
-        if bool(mild.all()):
-            low += here
+        here = (columns * (spread if least > _ALONE else torch.where(seen, spread, 0.0)).unsqueeze(2)) @ columns.mT
+        total[at] += here
+        if least >= 0.5:
+            low[at] += here
         else:
-            low += (columns * torch.where(mild, spread, 0.0).unsqueeze(2)) @ columns.mT
-            high += (columns * (~mild).to(spread).unsqueeze(2)) @ columns.mT
-        squares += residuals.square().sum(-1)
+            low[at] += (columns * torch.where(mild, spread, 0.0).unsqueeze(2)) @ columns.mT
+            high[at] += (columns * (~mild).to(spread).unsqueeze(2)) @ columns.mT
+        squares[at] += residuals.square().sum(-1)
         weight = data.root_weight.square().expand_as(residuals)  # as if noise were constant
-        left_over += torch.where(weight > 0, left, 0.0).sum(-1)
-        influence = (by_channel.mT @ columns).square_()  # (M, C, D, N)
-        if not bool(seen.all()):
-            touched = influence > _REACHED * reach.diagonal(dim1=-2, dim2=-1)[:, None, :, None].abs()
-            unknown |= (touched & ~seen.unsqueeze(2)).any(-1).any(1)
-        even += (influence @ weight.unsqueeze(-1)).sum((1, 3))
-        even_squared += (influence.square_() @ weight.square().unsqueeze(-1)).sum((1, 3))
+        left_over[at] += torch.where(weight > 0, left, 0.0).sum(-1)
+        influence = (by_channel[at].mT @ columns).square_()  # (M, C, D, N)
+        if least <= _ALONE:
+            touched = influence > _REACHED * reach[at].diagonal(dim1=-2, dim2=-1)[:, None, :, None].abs()
+            unknown[at] |= (touched & ~seen.unsqueeze(2)).any(-1).any(1)
+        influence.mul_(weight.unsqueeze(2))
+        even[at] += influence.sum((1, 3))
+        even_squared[at] += torch.linalg.vector_norm(influence, dim=(1, 3)).square()
     total = problem.scatter_matrix(total)
     if known:
         return Noise(total, total, unknown, torch.ones_like(x))

@@ -5,6 +5,7 @@ normal equations are summed from those into the (D, D) matrix: 31 channels cost 
 summed in chunks, and batched over rows: starts, and materials that share their directions.
 """
 
+import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -26,6 +27,10 @@ class Gram(NamedTuple):
     loss: Tensor  # (S,)
     gradient: Tensor  # (S, D), of half the loss
     matrix: Tensor  # (S, D, D), J^T J
+
+    def pick(self, index: Tensor) -> "Gram":
+        """The rows of an index."""
+        return Gram(*(part[index] for part in self))
 
 
 class Problem:
@@ -83,6 +88,7 @@ class Problem:
         """Whether the residuals are linear in f."""
         return self.plan.robust is None and self.loss_kind.factor is not None
 
+    @functools.cached_property
     def squares(self) -> Tensor:
         """The sum of squares of the weighted c y, (M,): the unit in which losses of any data are of order one."""
         return (self.data.root_weight * self.data.c * self.data.y).square().sum((1, 2))
@@ -169,23 +175,24 @@ class Problem:
         gradient = torch.zeros(starts, channels, names, dtype=torch.float64)
         matrix = torch.zeros(starts, channels, names, names, dtype=torch.float64)
         natural = self.natural(x)
-        for piece in self.data.chunks(len(x)):
-            data = piece if which is None else piece.rows(which)
-            columns = self.columns.all(natural, data.g, starts, channels)
-            rho, r, slope = self.residuals(_mixed(mix.value, columns), data, which)
-            loss += rho.sum((1, 2))
+        for at, _, piece in self.data.blocks(starts):
+            own = None if which is None else which[at]
+            data = piece if own is None else piece.rows(own)
+            columns = self.columns.all(rows_of(natural, at), data.g, at.stop - at.start, channels)
+            slopes = mix.slopes[at]
+            rho, r, slope = self.residuals(_mixed(mix.value[at], columns), data, own)
+            loss[at] += rho.sum((1, 2))
             if self.linear and columns.shape[1] == 1:
                 factor = linear_factor(self.loss_kind, data)
                 if factor.shape[1] == 1:  # one product of columns serves all channels
                     weighed = columns * factor.unsqueeze(2)
-                    products = mix.slopes.transpose(2, 3) @ (weighed @ weighed.transpose(2, 3))
-                    matrix += products @ mix.slopes
-                    right = weighed[:, 0] @ r.transpose(1, 2)  # (S, Q, C)
-                    gradient += (mix.slopes.transpose(2, 3) @ right.transpose(1, 2).unsqueeze(-1)).squeeze(-1)
+                    matrix[at] += slopes.mT @ (weighed @ weighed.mT) @ slopes
+                    right = weighed[:, 0] @ r.mT  # (S, Q, C)
+                    gradient[at] += (slopes.mT @ right.mT.unsqueeze(-1)).squeeze(-1)
                     continue
-            rows = slope.unsqueeze(2) * (mix.slopes.transpose(2, 3) @ columns)  # (S, C, P, N)
-            gradient += (rows @ r.unsqueeze(-1)).squeeze(-1)
-            matrix += rows @ rows.transpose(2, 3)
+            rows = slope.unsqueeze(2) * (slopes.mT @ columns)  # (S, C, P, N)
+            gradient[at] += (rows @ r.unsqueeze(-1)).squeeze(-1)
+            matrix[at] += rows @ rows.mT
         return Gram(loss, self.scatter_vector(gradient), self.scatter_matrix(matrix))
 
     def scatter_vector(self, by_channel: Tensor) -> Tensor:
@@ -204,6 +211,11 @@ class Problem:
     def held(self, x: Tensor, gradient: Tensor) -> Tensor:
         """Which values lie on an end of their box with the descent pointing out of it, (S, D)."""
         return ((x <= self.low) & (gradient > 0)) | ((x >= self.high) & (gradient < 0))
+
+
+def rows_of(natural: Values, at: slice) -> dict[str, Tensor]:
+    """Some of the rows of natural values, of those that differ by row."""
+    return {key: value[at] if value.ndim == 3 else value for key, value in natural.items()}
 
 
 def linear_factor(loss: Loss, data: Data) -> Tensor:

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from .problem import Gram, Problem, linear_factor
+from ..parameters import Values
+from .problem import Gram, Problem, linear_factor, rows_of
 from .solve import MOST, Block, Faces, solve_box, solve_faces
 from .unknowns import Group, groups, natural_of
 
@@ -54,6 +55,7 @@ class Projection:
         self.count = sum(group.count for group in self.groups)
         self.unknown_keys = list({key: None for group in self.groups for key in (group.scale, group.f0) if key})
         self.shapes = [p for p, key in enumerate(problem.keys) if key not in self.unknown_keys]
+        self.searched = torch.tensor([p in self.shapes for p in range(len(problem.keys))])
         if not self.groups:
             return
         start = problem.plan.start
@@ -110,15 +112,19 @@ class Projection:
                 made.append(Block((group.at,), 0 * ones, torch.inf * ones))
         return tuple(made)
 
-    def affine(self, x: Tensor, *, slopes: bool = True) -> Affine:
-        """The coefficients as functions of the unknowns at the shapes of x (S, D)."""
-        problem, starts = self.problem, len(x)
-        natural = problem.natural(x)
-        corners = self.base + torch.cat([torch.zeros(1, self.count), torch.eye(self.count)]).to(x)[:, None] * self.step
-        found = natural_of(self.groups, corners, {key: torch.zeros(1).to(x) for key in self.unknown_keys})
-        at = {key: value[:, None, None] for key, value in found.items()}  # (L + 1, 1, 1, C)
-        shape = (self.count + 1, starts, 1, problem.channels)
-        values = {**natural, **at}
+    @functools.cached_property
+    def _corners(self) -> dict[str, Tensor]:
+        """Natural values of unknowns at their base, then one step from it along each, (L + 1, 1, 1, C)."""
+        away = torch.cat([torch.zeros(1, self.count), torch.eye(self.count)]).to(self.base)
+        none = torch.zeros(1).to(self.base)
+        found = natural_of(self.groups, self.base + away[:, None] * self.step, dict.fromkeys(self.unknown_keys, none))
+        return {key: value[:, None, None] for key, value in found.items()}
+
+    def affine(self, x: Tensor, natural: Values, *, slopes: bool = True) -> Affine:
+        """The coefficients as functions of the unknowns at the shapes of x (S, D), and its natural values."""
+        problem = self.problem
+        shape = (self.count + 1, len(x), 1, problem.channels)
+        values = {**natural, **self._corners}
         c = problem.columns.coefficients(values, shape).squeeze(2)  # (L + 1, S, C, K)
         names = len(problem.keys)
         if slopes and any(p in self.shapes for _, p in problem.columns.coefficient_derivatives):
@@ -139,34 +145,34 @@ class Projection:
         y = factor * data.y
         return factor, y, y.square().sum(-1)
 
-    def products(self, x: Tensor, which: Tensor | None, *, derivatives: bool = True) -> Products:
-        """The products at each row x (S, D), its own material's data: (S, W, Q, Q), (S, C, Q), (S, C)."""
-        problem, starts = self.problem, len(x)
+    def products(self, starts: int, natural: Values, which: Tensor | None, *, derivatives: bool = True) -> Products:
+        """The products at each row's values, its own material's data: (S, W, Q, Q), (S, C, Q), (S, C)."""
+        problem = self.problem
         problem.evaluations += starts
-        natural = problem.natural(x)
         evaluate = problem.columns.all if derivatives else problem.columns.values
         factor, y, squares = self._weighed
         own = which if which is not None and len(y) > 1 else None
-        parts: list[tuple[Tensor, ...]] = []
-        for begin, piece in problem.data.places(starts):
-            columns = evaluate(natural, piece.g, starts, problem.channels)
+        parts: dict[int, list[tuple[Tensor, ...]]] = {}
+        for rows, begin, piece in problem.data.blocks(starts):
+            columns = evaluate(rows_of(natural, rows), piece.g, rows.stop - rows.start, problem.channels)
             at = slice(begin, begin + len(piece.c))
-            right = y[..., at] if own is None else y[..., at][own]
-            weight = (factor[..., at] if own is None or len(factor) == 1 else factor[..., at][own]).unsqueeze(2)
+            right, weight = y[..., at], factor[..., at].unsqueeze(2)
+            if own is not None:
+                right = right.index_select(0, own[rows])
+                weight = weight if len(factor) == 1 else weight.index_select(0, own[rows])
             weighed = columns.mul_(weight) if weight.shape[1] <= columns.shape[1] else columns * weight
             if weighed.shape[1] == 1:
                 data = (weighed[:, 0] @ right.mT).mT
             else:
                 data = (weighed @ right.unsqueeze(-1)).squeeze(-1)
-            parts.append((weighed @ weighed.mT, data))
-        gram, data = _summed(parts)
+            parts.setdefault(rows.start, []).append((weighed @ weighed.mT, data))
+        gram, data = (_joined(each) for each in zip(*map(_summed, parts.values()), strict=True))
         return Products(gram, data, (squares if own is None else squares[own]).expand(starts, -1))
 
-    def scan_products(self, x: Tensor) -> Products:
-        """The products of the bases at each row of x (S, D) with the data of all materials: lead (S, M), or (S, 1)."""
-        problem, starts = self.problem, len(x)
+    def scan_products(self, starts: int, natural: Values) -> Products:
+        """The products of the bases at each row's values with the data of all materials: lead (S, M), or (S, 1)."""
+        problem = self.problem
         problem.evaluations += starts
-        natural = problem.natural(x)
         factor, y, squares = self._weighed
         parts: list[tuple[Tensor, ...]] = []
         for begin, piece in problem.data.places(starts):
@@ -227,10 +233,9 @@ class Projection:
         dense_g = right.new_zeros(rows, self.size**2).index_add_(1, both, gram.reshape(rows, -1))
         return dense_g.reshape(rows, self.size, self.size), dense_r
 
-    def write(self, x: Tensor, z: Tensor) -> Tensor:
-        """The rows x (S, D) with the unknowns z (S, C, L) in them, put into the box."""
+    def write(self, x: Tensor, natural: Values, z: Tensor) -> Tensor:
+        """The rows x (S, D), and its natural values, with the unknowns z (S, C, L) in them, put into the box."""
         problem = self.problem
-        natural = problem.natural(x)
         otherwise = {key: natural[key].squeeze(1) for key in self.unknown_keys}
         x = x.clone()
         for key, value in natural_of(self.groups, z, otherwise).items():
@@ -240,14 +245,16 @@ class Projection:
 
     def solved(self, x: Tensor, which: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """The rows with their unknowns solved for, and their loss (S,)."""
-        affine = self.affine(x, slopes=False)
-        found = self.solve(self.products(x, which, derivatives=False), affine.offset, affine.a)
-        return self.write(x, found.z), found.loss
+        natural = self.problem.natural(x)
+        affine = self.affine(x, natural, slopes=False)
+        found = self.solve(self.products(len(x), natural, which, derivatives=False), affine.offset, affine.a)
+        return self.write(x, natural, found.z), found.loss
 
     def gram(self, x: Tensor, which: Tensor | None = None) -> tuple[Tensor, Gram]:
         """The rows with their unknowns solved for, and the normal equations of the shapes alone, 0 elsewhere."""
         problem = self.problem
-        products, affine = self.products(x, which), self.affine(x)
+        natural = problem.natural(x)
+        products, affine = self.products(len(x), natural, which), self.affine(x, natural)
         solved = self.solve(products, affine.offset, affine.a)
         z, a = solved.z, affine.a
         c = affine.offset + (a @ z.unsqueeze(-1)).squeeze(-1)
@@ -255,14 +262,14 @@ class Projection:
         columns = problem.columns
         value, v = columns.mix(c, torch.zeros_like(slopes), problem.chain(x))
         v[..., : columns.bases, :] = slopes  # raw already
-        v = v * torch.tensor([p in self.shapes for p in range(len(problem.keys))])
+        v = v * self.searched
         gv = products.columns @ v  # (S, C, Q, P)
         residual = (products.columns @ value.unsqueeze(-1)).squeeze(-1) - products.data
         gradient = (v.mT @ residual.unsqueeze(-1)).squeeze(-1)
         matrix = v.mT @ gv
         across = a.mT @ gv[..., : columns.bases, :]  # (S, C, L, P), F^T V
         inner = a.mT @ products.columns[..., : columns.bases, : columns.bases] @ a
-        x = self.write(x, z)
+        x = self.write(x, natural, z)
         whole = problem.scatter_matrix(matrix)
         d = solved.directions
         if self.mixed or self.merged:
@@ -282,6 +289,10 @@ class Projection:
         flat = (self.place.unsqueeze(-1) * problem.size + problem.index.unsqueeze(-2)).reshape(-1)
         out = across.new_zeros(len(across), self.size * problem.size)
         return out.index_add_(1, flat, across.reshape(len(across), -1)).reshape(-1, self.size, problem.size)
+
+
+def _joined(parts: tuple[Tensor, ...]) -> Tensor:
+    return parts[0] if len(parts) == 1 else torch.cat(parts)
 
 
 def _summed(parts: list[tuple[Tensor, ...]]) -> list[Tensor]:

@@ -12,6 +12,7 @@ from ..energy.certificate import Certificate, certify
 from ..formats.samples import Samples
 from ..models.form import Form
 from ..models.material import Material
+from .every_error import errors
 from .plan import Plan
 from .rung import Rung, table
 
@@ -70,9 +71,9 @@ class Fit:
     parameters: dict[str, Tensor]
     standard_errors: dict[str, Tensor]
     intervals: dict[str, Tensor]
-    errors: dict[str, float]
     loss: str
     objective: float
+    weighed: bool  # whether the samples' sigma weighed the loss
     status: str
     message: str
     undetermined: tuple[str, ...]
@@ -96,6 +97,12 @@ class Fit:
     def material(self) -> Material:
         """The fitted material."""
         return Material(self.form, self.values)
+
+    @cached_property
+    def errors(self) -> dict[str, float]:
+        """The error under every loss, and `cosine_rms` (every_error.py): computed when first read."""
+        found = errors(self.material, self.samples)
+        return found if self.weighed or self.plan.robust else found | {self.loss: self.objective}
 
     @cached_property
     def certificate(self) -> Certificate:

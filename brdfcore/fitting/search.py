@@ -94,7 +94,7 @@ def _spread(found: Found) -> Tensor:
     plain = Problem(replace(problem.plan, robust=None), [], problem.loss_kind, data=problem.data)
     data = problem.data.rows(which)
     r = plain.residuals(problem.f(found.outcome.x, data), data, which)[1].flatten(1)
-    least = 1e-12 * (problem.squares() / r.shape[1]).sqrt()
+    least = 1e-12 * (problem.squares / r.shape[1]).sqrt()
     return torch.maximum(SPREAD * r.abs().median(1).values, least.clamp(min=1e-300))
 
 
@@ -165,8 +165,10 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     tell = _tell(say, 0.5, 0.9)
     x = best.x
     if projected and linear:
-        wholly = projection if whole is coarse else Projection(whole)
-        best = variable_projection(wholly, x, rows, on_step=tell)
+        if whole is coarse and not projection.may_leave_the_box:
+            best = variable_projection(projection, x, rows, on_step=tell, known=best.gram)
+        else:
+            best = variable_projection(Projection(whole), x, rows, on_step=tell)
         iterations += best.iterations
         x = best.x
     best = least_squares(whole, x, rows, on_step=tell)

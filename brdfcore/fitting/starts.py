@@ -118,10 +118,13 @@ def _solved(projection: Projection, points: Tensor) -> tuple[Tensor, Tensor]:
     rows: list[Tensor] = []
     losses: list[Tensor] = []
     for x in points.split(_AT_ONCE):
-        affine = projection.affine(x, slopes=False)
-        found = projection.solve(projection.scan_products(x), affine.offset.unsqueeze(1), affine.a.unsqueeze(1))
+        natural = projection.problem.natural(x)
+        affine = projection.affine(x, natural, slopes=False)
+        products = projection.scan_products(len(x), natural)
+        found = projection.solve(products, affine.offset.unsqueeze(1), affine.a.unsqueeze(1))
         materials = found.loss.shape[1]
-        each = x.unsqueeze(1).expand(-1, materials, -1).reshape(-1, x.shape[-1])
-        rows.append(projection.write(each, found.z.flatten(0, 1)).reshape(len(x), materials, -1))
+        each = x.repeat_interleave(materials, 0)
+        written = projection.write(each, projection.problem.natural(each), found.z.flatten(0, 1))
+        rows.append(written.reshape(len(x), materials, -1))
         losses.append(found.loss)
     return torch.cat(rows).transpose(0, 1), torch.cat(losses).T

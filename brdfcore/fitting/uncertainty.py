@@ -65,7 +65,7 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
             field="values",
         )
     matrix, diagonal = gram.matrix, gram.matrix.diagonal(dim1=-2, dim2=-1)
-    blind = diagonal <= (_SILENT**2 * problem.squares()).unsqueeze(-1)
+    blind = diagonal <= (_SILENT**2 * problem.squares).unsqueeze(-1)
     pressed = gram.gradient.abs() > _PRESSED * (diagonal * gram.loss.unsqueeze(-1)).sqrt()
     held = problem.held(x, gram.gradient) & pressed
     spectrum = Spectrum.of(matrix, ~held & ~blind)
@@ -120,7 +120,7 @@ def _loose(problem: Problem, gram: Gram, spectrum: Spectrum, level: Tensor, leng
     cost = 2 * gram.gradient.abs() * lengths + stiffness * lengths.square()
     hidden = cost * diagonal < LENGTH * level.diagonal(dim1=-2, dim2=-1)
     rounding = (stiffness <= RANK * diagonal) & (
-        gram.gradient.square() <= 1e-14 * diagonal * problem.squares().unsqueeze(-1)
+        gram.gradient.square() <= 1e-14 * diagonal * problem.squares.unsqueeze(-1)
     )
     return hidden | rounding
 

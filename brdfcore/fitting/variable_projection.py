@@ -16,14 +16,17 @@ def variable_projection(
     tolerance: float = DECREMENT,
     max_iterations: int = 100,
     on_step: OnStep | None = None,
+    known: Gram | None = None,
 ) -> Outcome:
-    """The optimum that each row x (S, D) leads to, after at most so many iterations; `which` names its material."""
+    """The optimum that each row x (S, D) leads to, after at most so many iterations; `which` names its material.
+
+    Its equations, and those `known` where x is such an end, are those of the shapes alone.
+    """
 
     def evaluate(x: Tensor, rows: Tensor) -> tuple[Tensor, Gram]:
         return projection.gram(x, None if which is None else which[rows])
 
     problem = projection.problem
-    floor = _ROUNDING * problem.squares()
+    floor = _ROUNDING * problem.squares
     floor = floor.expand(len(x)) if which is None else floor[which]
-    found = levenberg_marquardt(problem, evaluate, x, floor, tolerance, max_iterations, on_step)
-    return found._replace(gram=None)  # that of the shapes alone
+    return levenberg_marquardt(problem, evaluate, x, floor, tolerance, max_iterations, on_step, known)

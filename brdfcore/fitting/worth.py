@@ -8,11 +8,10 @@ from torch import Tensor
 
 from .. import __version__
 from ..formats.samples import Samples
-from ..models.material import Material
-from .data import Data, stacked_weights
+from .data import stacked_weights
 from .identifiability import name_of, named
 from .levenberg_marquardt import Outcome
-from .losses import LOSSES
+from .losses import root_mean
 from .problem import Problem
 from .result import Cost, Fit
 from .support import supports, warnings
@@ -26,26 +25,26 @@ def fits(
     plan, x, channels = problem.plan, outcome.x, fitted[0].channels
     weighed = problem.loss_kind.statistical and fitted[0].sigma is not None and fitted[0].weight is None
     known = uncertainty(problem, x, outcome.gram)
-    f = torch.cat([problem.f(x, piece) for piece in problem.data.chunks(len(x))], dim=-1)  # (M, C, N)
     values = {key: value.squeeze(1).expand(len(x), -1) for key, value in _rows(problem, x).items()}
     described = _described(problem, values, known)
-    every_error = _errors(f, problem.data, fitted)
     chi_square: list[float] | None = None
     if problem.data.sigma is not None:
+        f = torch.cat([problem.f(x, piece) for piece in problem.data.chunks(len(x))], dim=-1)  # (M, C, N)
         chi_square = ((f - problem.data.y) / problem.data.sigma).square().sum((1, 2)).tolist()
-    freedom, minima, ends = known.freedom.tolist(), outcome.loss.tolist(), outcome.converged.tolist()
+    minima = outcome.loss
+    if problem.loss_kind.is_mean and not (weighed or plan.robust):
+        minima = root_mean(minima, stacked_weights(fitted, problem.loss_kind), problem.channels)
+    freedom, objectives, ends = known.freedom.tolist(), minima.tolist(), outcome.converged.tolist()
     typical = torch.as_tensor(problem.data.scales.y, dtype=torch.float64).reshape(-1)
     told = warnings(plan, supports(fitted[0]), problem.data.y, typical, problem.loss_kind.name)
     names = [name_of(problem, at, channels) for at in range(problem.size)]
-    certain = known.covariance.diagonal(dim1=-2, dim2=-1).isfinite()
+    covariances = _certain(known.covariance)
     of_row = {key: value.reshape(len(x), *plan.start[key].shape).unbind() for key, value in values.items()}
     held, vague = known.held.tolist(), known.vague.tolist()
     found = []
     for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
-        error = every_error[row]
         parameters, standard_errors, intervals = described[row]
         undetermined, combinations = named(problem, known.unseen[row], known.chain[row], channels)
-        kept = certain[row].nonzero()[:, 0]
         found.append(
             Fit(
                 plan=plan,
@@ -58,11 +57,11 @@ def fits(
                 undetermined=undetermined,
                 combinations=combinations,
                 singular_values=known.singular_values[row],
-                covariance=known.covariance[row, kept[:, None], kept],
-                covariance_keys=tuple(names[at] for at in kept.tolist()),
-                errors=error,
+                covariance=covariances[row][0],
+                covariance_keys=tuple(names[at] for at in covariances[row][1]),
                 loss=problem.loss_kind.name,
-                objective=minima[row] if weighed or plan.robust else error[problem.loss_kind.name],
+                objective=objectives[row],
+                weighed=weighed,
                 status=("undetermined" if undetermined else "converged") if ends[row] else "stopped_early",
                 message=_message(
                     problem, held[row], vague[row], undetermined, freedom[row], converged=ends[row], weighed=weighed
@@ -81,32 +80,19 @@ def fits(
     return found
 
 
+def _certain(covariance: Tensor) -> list[tuple[Tensor, list[int]]]:
+    """Of each covariance (M, D, D) what has a standard error, (K, K), and its positions."""
+    found: list[tuple[Tensor, list[int]]] = []
+    for whole, certain in zip(covariance, covariance.diagonal(dim1=-2, dim2=-1).isfinite().tolist(), strict=True):
+        kept = [at for at, one in enumerate(certain) if one]
+        found.append((whole.clone() if all(certain) else whole[kept][:, kept], kept))
+    return found
+
+
 def _rows(problem: Problem, x: Tensor) -> dict[str, Tensor]:
     """All natural values by key in the order of the text, (M, 1, n)."""
     natural = problem.natural(x)
     return {key: natural[key].reshape(-1, 1, natural[key].shape[-1] if natural[key].ndim else 1) for key in natural}
-
-
-def errors(material: Material, samples: Samples) -> dict[str, float]:
-    """The material's error under every loss by its definition, and `cosine_rms`, the root of the cosine loss's mean."""
-    with torch.no_grad():
-        pairs = zip(samples.wi.split(65536), samples.wo.split(65536), strict=True)
-        f = torch.cat([material.f(wi, wo) for wi, wo in pairs]).expand_as(samples.values)
-    data = Data.of([samples], frozenset(), LOSSES["cosine"], None)
-    return _errors(f.T.unsqueeze(0), data, [samples])[0]
-
-
-def _errors(f: Tensor, data: Data, samples: Sequence[Samples]) -> list[dict[str, float]]:
-    """The errors of values f (M, C, N), by material."""
-    found: dict[str, list[float]] = {}
-    for name, kind in LOSSES.items():
-        weight = stacked_weights(samples, kind)  # (M, 1, N), or (1, 1, N)
-        total = (weight * kind.difference(f, data.y, data.c, data.scales).square()).sum((1, 2))
-        root_mean = (total / (weight.sum((1, 2)) * f.shape[1])).sqrt()
-        found[name] = (root_mean if kind.is_mean else total).tolist()
-        if name == "cosine":
-            found["cosine_rms"] = root_mean.tolist()
-    return [{name: each[row] for name, each in found.items()} for row in range(len(f))]
 
 
 Described = tuple[dict[str, Tensor], dict[str, Tensor], dict[str, Tensor]]

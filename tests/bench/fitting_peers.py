@@ -136,9 +136,11 @@ def seconds(call: Callable[[], object]) -> float:
 
 
 def by_turns(calls: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
-    """The median wall time of each call [s]; each round calls all, so that a busy machine slows all alike."""
+    """The median processor time of each call [s]; each round calls all, so that a busy machine slows all alike."""
     times: dict[str, list[float]] = {name: [] for name in calls}
     for _ in range(rounds):
         for name, call in calls.items():
-            times[name].append(seconds(call))
+            begun = time.process_time()
+            call()
+            times[name].append(time.process_time() - begun)
     return {name: float(np.median(each)) for name, each in times.items()}

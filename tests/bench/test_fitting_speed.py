@@ -2,7 +2,7 @@
 
 A peer gets one random start in the ranges of our scan, and hand-written numpy, of directions and parameters as users
 write it, or tuned: with all that the directions decide computed beforehand. A fit chooses its own starts, and computes
-intervals and every error too.
+intervals too; errors under other losses are computed when they are first read.
 """
 
 import itertools

@@ -85,7 +85,7 @@ def check(problem: Problem) -> None:
         return
     x, claimed = projection.gram(points(problem))
     whole = problem.gram(x)
-    unit = float(problem.squares())
+    unit = float(problem.squares)
     clipped = whole.loss > claimed.loss + 1e-9 * unit  # outside the box before it was put into it
     if not projection.may_leave_the_box:
         assert not bool(clipped.any())
