@@ -70,4 +70,7 @@ def test_what_the_clock_can_tell_is_measured() -> None:
         {str(k): 1 + 0.02 * float(x) for k, x in enumerate(torch.randn(4000, generator=generator))} for _ in range(2)
     )
     assert _told_from_none(first, second) == pytest.approx(2 * 0.02, rel=0.05)
+    slowed = {name: 3 * seconds for name, seconds in second.items()}
+    assert _told_from_none(first, slowed) < 0.05, "a run that is slower as a whole says nothing of savings"
+    assert _told_from_none(first, second | {"7": 9.0}) == pytest.approx(2 * 0.02, rel=0.05), "nor does one busy moment"
     assert _told_from_none(first, first) == 0
