@@ -126,10 +126,11 @@ def _message(error: Mapping[str, Any]) -> str:
         return f"Expected {name} to be given, got nothing. Add it."
     if error["type"] == "extra_forbidden":
         return f"Expected no field {name}, because it has no meaning here. Remove it, or correct its name."
-    rule = error["msg"].removeprefix("Input should be ").removeprefix("Input should ")
+    rule, _, length = error["msg"].partition(" after validation, not ")
+    rule = rule.partition(" should ")[2] or f"be {rule}"
     given = error["input"]
     shown = f", got {given!r}" if isinstance(given, str | int | float | None) and len(repr(given)) <= 80 else ""
-    return f"Expected {name} to be {rule}{shown}. Correct it."
+    return f"Expected {name} to {rule}{f', got {length}' if length else shown}. Correct it."
 
 
 async def _http_error(request: Request, error: Exception) -> Response:

@@ -88,7 +88,7 @@ def _numbers(it: "Certificate") -> list[str]:
         above = "nowhere"
     else:
         first, last = (f"{math.degrees(theta):.7g}" for theta in it.exceeds)
-        above = f"from {first} to {last} degrees"
+        above = f"first at {first}, last at {last} degrees"  # between them it need not be
     grazing = f"like 1/{it.power}" if it.grazing_exponent else f"{it.grazing_limit:.7g}"
     rows = {
         "largest albedo": largest,
@@ -110,7 +110,9 @@ def _albedos(material: "Material", it: "Certificate") -> list[str]:
     with torch.no_grad():
         albedos = bc.albedo(material, theta, it.at_phi, tolerance=1e-4).values[:, it.channel].tolist()
     azimuth = "" if it.isotropic else f" at azimuth {math.degrees(it.at_phi):.3g}"
+    shown = [f"{value:.4g}" for value in albedos]
+    wide = max(8, 2 + max(map(len, shown)))
     return [
-        f"{'theta [degrees]':<{INDENT}}" + "".join(f"{angle:<8g}" for angle in ANGLES_DEG).rstrip(),
-        f"{'albedo' + azimuth:<{INDENT}}" + "".join(f"{value:<8.4g}" for value in albedos).rstrip(),
+        f"{'theta [degrees]':<{INDENT}}" + "".join(f"{angle:<{wide}g}" for angle in ANGLES_DEG).rstrip(),
+        f"{'albedo' + azimuth:<{INDENT}}" + "".join(f"{value:<{wide}}" for value in shown).rstrip(),
     ]

@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +11,9 @@ import typer
 from ._bar import with_bar
 
 if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
     from ..energy.albedo import Albedo
     from ..energy.tables import AlbedoTable
     from ..models.material import Material
@@ -55,7 +59,7 @@ def command(
             _print_values(made, angles, phi_deg, found)
     else:
         require_suffix(table)
-        axes = axes_in_radians(dict(_axis(text) for text in axis or []))
+        axes = axes_in_radians(_axes(axis or []))
         wanted = 1e-4 if tolerance is None else tolerance
         result = with_bar("table", lambda progress: bc.albedo_table(made, axes, wanted, progress=progress))
         result.save(table)
@@ -80,7 +84,12 @@ def _albedo(material: "Material", theta_deg: list[float], phi_deg: float, tolera
     wrong = [angle for angle in theta_deg if not 0 <= angle < 90]
     if wrong:
         raise InvalidValueError(
-            f"Expected --theta-deg to be angles in [0, 90), got {wrong[0]:g}. Leave it out.", field="theta_deg"
+            f"Expected --theta-deg to be angles in [0, 90), got {wrong[0]:g}. Give polar angles below 90.",
+            field="theta_deg",
+        )
+    if not math.isfinite(phi_deg):
+        raise InvalidValueError(
+            f"Expected --phi-deg to be a finite angle, got {phi_deg:g}. Give the azimuth in degrees.", field="phi_deg"
         )
     with torch.no_grad():
         theta = torch.deg2rad(torch.tensor(theta_deg, dtype=torch.float64))
@@ -89,12 +98,9 @@ def _albedo(material: "Material", theta_deg: list[float], phi_deg: float, tolera
 
 def _print_values(material: "Material", theta_deg: list[float], phi_deg: float, found: "Albedo") -> None:
     from rich import box
-    from rich.console import Console
     from rich.table import Column, Table
     from rich.text import Text
 
-    console = Console(highlight=False)
-    console.print(str(material), markup=False, soft_wrap=True)
     channels = found.values.shape[-1]
     names = ["albedo"] if channels == 1 else [f"albedo {k}" for k in range(channels)]
     headers = ("theta [degrees]", *names, "claimed error")
@@ -103,21 +109,22 @@ def _print_values(material: "Material", theta_deg: list[float], phi_deg: float, 
     for theta, row, error in zip(theta_deg, found.values.tolist(), found.error.tolist(), strict=True):
         numbers = [Text(f"{a:.{digits}f}", style="bold red" if a > 1 + found.tolerance else "") for a in row]
         table.add_row(Text(f"{theta:g}"), *numbers, Text(f"{max(error):.1e}"))
+    console = _console(table)
+    console.print(str(material), markup=False, soft_wrap=True)
     console.print(table)
     if bool((found.values > 1 + found.tolerance).any()):
         console.print("It gives back more light than it gets where the albedo exceeds 1.", style="red")
     azimuth = f"azimuth {phi_deg:g} degrees, " if _anisotropic(material) else ""
     met = f"tolerance {found.tolerance:g} met" if found.met else f"TOLERANCE {found.tolerance:g} NOT MET"
-    console.print(f"{azimuth}{found.method}, {met}, {found.evaluations} evaluations, {found.seconds:.2f} s")
+    console.print(
+        f"{azimuth}{found.method}, {met}, {found.evaluations} evaluations, {found.seconds:.2f} s", soft_wrap=True
+    )
 
 
 def _print_table(result: "AlbedoTable", path: Path) -> None:
     from rich import box
-    from rich.console import Console
     from rich.table import Column, Table
 
-    console = Console(highlight=False)
-    console.print(result.material.form.text(), markup=False, soft_wrap=True)
     table = Table(
         Column("axis", no_wrap=True),
         *(Column(name, justify="right") for name in ("from", "to", "nodes")),
@@ -127,13 +134,27 @@ def _print_table(result: "AlbedoTable", path: Path) -> None:
         angle = axis.name in ("theta", "phi")
         ends = [math.degrees(end) if angle else end for end in (axis.low, axis.high)]
         table.add_row(f"{axis.name}_deg" if angle else axis.name, *(f"{end:.6g}" for end in ends), str(count))
+    console = _console(table)
+    console.print(result.material.form.text(), markup=False, soft_wrap=True)
     console.print(table)
     met = f"tolerance {result.tolerance:g} met" if result.met else f"TOLERANCE {result.tolerance:g} NOT MET"
     console.print(
-        f"error {result.error:.1e} with interpolation, {met}, {result.evaluations} evaluations, {result.seconds:.2f} s"
+        f"error {result.error:.1e} with interpolation, {met}, {result.evaluations} evaluations, {result.seconds:.2f} s",
+        soft_wrap=True,
     )
     size = f"{path.stat().st_size / 1000:.1f} kB"
-    console.print(f"Table: {path} ({size}), hash {result.hash[:12]}", markup=False)
+    console.print(f"Table: {path} ({size}), hash {result.hash[:12]}", markup=False, soft_wrap=True)
+
+
+def _console(table: "Table") -> "Console":
+    """A console at least as wide as the table, so that no digit of a number is cut off."""
+    from rich.console import Console
+    from rich.measure import Measurement
+
+    console = Console(highlight=False)
+    needed = Measurement.get(console, console.options.update(max_width=sys.maxsize), table).maximum
+    console.width = max(console.width, needed)
+    return console
 
 
 def _anisotropic(material: "Material") -> bool:
@@ -151,6 +172,21 @@ def _numbers(text: str) -> list[float]:
             f"Expected --theta-deg to be numbers separated by commas, got {text!r}. Write it like 0,60,89.",
             field="theta_deg",
         ) from error
+
+
+def _axes(texts: list[str]) -> dict[str, tuple[float, float] | None]:
+    """The ranges of the axes by their keys."""
+    from ..errors import InvalidValueError
+
+    axes: dict[str, tuple[float, float] | None] = {}
+    for text in texts:
+        key, ends = _axis(text)
+        if key in axes:
+            raise InvalidValueError(
+                f"Expected --axis to name every axis once, got {key} twice. Drop one of them.", field="axis"
+            )
+        axes[key] = ends
+    return axes
 
 
 def _axis(text: str) -> tuple[str, tuple[float, float] | None]:

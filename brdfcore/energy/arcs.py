@@ -26,8 +26,8 @@ from ..parameters import Values
 from .refinement import Integral, Rows, Sums, take
 from .rules import LADDER, gauss
 
-PIECES = 4
-TINY = 1e-300  # a T that divides
+PIECES = 4  # both ends of the arcs, each on either side of the slope at which it changes its kind
+TINY = 1e-300  # stands for a T of 0 where it divides: the arcs that would need it are empty
 
 
 class Arcs(Integral):

@@ -31,7 +31,7 @@ FINEST, WIDEST = 1e-3, 1.0  # widths of kernels
 POINTS, STEPS = 129, 3  # about each place, between which a map is inverted, and steps of Newton's method from there
 LOPSIDED = 0.3  # a ratio of widths below which a Smith lobe's masking has features at the horizon
 SLIGHT = 1e5  # times the error that may be neglected: what a tail is worth whose features need not be met
-PRECISE = 2e-13  # an error that may be neglected from which on fewer rays pay for a map: at 1e-9 of tolerance
+PRECISE = 2e-13  # an error that may be neglected from which on fewer rays pay for a map: at 2e-9 of tolerance
 
 
 class Rays(NamedTuple):
@@ -216,12 +216,12 @@ class Circle:
             weight = slope * weight
         else:
             rule = gauss(size).to(self.tau.device)
-            pieces = []
-            for low, high, steepness in self._pieces(chosen):
-                *at, slope = self.at(chosen, low + (high - low) * rule.nodes, steepness)
-                pieces.append((*at, slope * (high - low) * rule.weights * (1 if self.two else 2)))
+            pieces = self._pieces(chosen)
             panels = len(pieces)
-            cos_t, sin_t, from_wo, weight = (torch.cat(v, 1) for v in zip(*pieces, strict=True))
+            low, high, steepness = (torch.cat(v, 1).repeat_interleave(size, 1) for v in zip(*pieces, strict=True))
+            w = low + (high - low) * rule.nodes.repeat(panels)
+            cos_t, sin_t, from_wo, slope = self.at(chosen, w, steepness)
+            weight = slope * (high - low) * rule.weights.repeat(panels) * (1 if self.two else 2)
         wx, wy = self.wx[chosen], self.wy[chosen]
         x, y = wx * cos_t, wy * sin_t
         norm2 = x.square() + y.square()
@@ -230,14 +230,13 @@ class Circle:
         width = torch.rsqrt((x / wx).square() + (y / wy).square()) if self.two else wx.expand_as(x)
         return Rays(x, y, self.tau[chosen] * from_wo * over, width, weight * (wx * wy) / norm2, rule, panels)
 
-    def _pieces(self, chosen: Tensor) -> list[tuple[Tensor | float, Tensor | float, Tensor]]:
-        """The pieces of the circle on which a lobe with kinks is smooth: both ends and the map's Y."""
-        y, fine, quarter = self.steepness[chosen], self.fine[chosen], math.pi / 2
+    def _pieces(self, chosen: Tensor) -> list[tuple[Tensor, Tensor, Tensor]]:
+        """The pieces of the circle on which a lobe with kinks is smooth: both ends and the map's Y, (R, 1) each."""
+        y, fine = self.steepness[chosen], self.fine[chosen]
+        quarters = [torch.full_like(y, k * math.pi / 2) for k in range(5)]
         if self.profile.kink == "grooves":  # the kinks change places where T cos phi = 1
             level = torch.asinh(torch.sinh(y) / self.tangent[chosen].clamp(min=1.0)) / y
             split = torch.acos(level.clamp(max=1.0))
-            return [(0.0, split, y), (split, 2 * quarter, y)]
-        pieces: list[tuple[Tensor | float, Tensor | float, Tensor]] = [(0.0, quarter, fine), (quarter, 2 * quarter, y)]
-        if self.two:
-            pieces += [(2 * quarter, 3 * quarter, y), (3 * quarter, 4 * quarter, fine)]
-        return pieces
+            return [(quarters[0], split, y), (split, quarters[2], y)]
+        pieces = list(zip(quarters[:-1], quarters[1:], (fine, y, y, fine), strict=True))
+        return pieces if self.two else pieces[:2]

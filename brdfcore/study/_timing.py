@@ -1,7 +1,8 @@
 """Times that can be compared: interleaved repeats of every task, the median of each, one thread for all.
 
 What else the machine does slows neighbours in time alike, so tasks take turns and their ratios are steadier than their
-seconds. One thread for torch, since NumPy's own loops have one.
+seconds. One thread for torch, since NumPy's own loops have one; the processor's time of one thread is the time that
+passes, but for what others take of the machine meanwhile.
 """
 
 import contextlib
@@ -26,13 +27,16 @@ def one_thread() -> Iterator[None]:
 
 
 def interleaved(tasks: Mapping[str, Callable[[], object]], repeats: int, *, warm: bool = False) -> dict[str, float]:
-    """The median seconds of each task over so many rounds; unless they are `warm`, each runs once before, untimed."""
+    """The median processor time [s] of each task over so many rounds.
+
+    Unless they are `warm`, each runs once before, untimed.
+    """
     taken: dict[str, list[float]] = {name: [] for name in tasks}
     for task in () if warm else tasks.values():
         task()
     for _ in range(repeats):
         for name, task in tasks.items():
-            begun = time.perf_counter()
+            begun = time.process_time()
             task()
-            taken[name].append(time.perf_counter() - begun)
+            taken[name].append(time.process_time() - begun)
     return {name: statistics.median(seconds) for name, seconds in taken.items()}

@@ -88,10 +88,11 @@ def effects(quick: bool = False, seed: int = 0, *, count: int | None = None, rep
     order = sorted(errors, key=lambda effect: errors[effect])
     together = [_Simpler(frozenset(order[: n + 1])) for n in range(len(order))]
     materials = {(): whole} | {tuple(sorted(s.without)): s.made() for s in [*alone.values(), *together]}
-    seconds = interleaved(
-        {str(key): _task(m, wi, wo) for key, m in materials.items()}, repeats or (15 if quick else 25)
-    )
-    time = {key: 1e9 * seconds[str(key)] / count for key in materials}
+    tasks = {str(key): _task(m, wi, wo) for key, m in materials.items()}
+    rounds = max(1, (repeats or (16 if quick else 24)) // 2)
+    first, second = (interleaved(tasks, rounds) for _ in range(2))
+    least = _told_from_none(first, second)
+    time = {key: 1e9 * min(first[str(key)], second[str(key)]) / count for key in materials}
     base = time[()]
     rows: list[tuple[Cell, ...]] = [("nothing", "", 0.0, base, 0.0)]
     for effect in order:
@@ -117,15 +118,26 @@ def effects(quick: bool = False, seed: int = 0, *, count: int | None = None, rep
                 "RMS relative error of f [1]",
             ),
         ),
-        sentence=_sentence(errors, {effect: 1 - time[(effect,)] / base for effect in order}),
+        sentence=_sentence(errors, {effect: 1 - time[(effect,)] / base for effect in order}, least),
         notes=(
             f"The material: {whole}.",
-            f"{count} pairs of directions in float64; times are medians of interleaved evaluations of f.",
+            f"{count} pairs of directions in float64; times are the lower of two medians of interleaved evaluations "
+            f"of f, which differ by so much that savings below {100 * least:.2g} % count as none.",
         ),
     )
 
 
-_LEAST = 0.01  # time saved that the clock can tell from none
+_NORMAL = 1.4826  # standard deviations in the median distance from the median, of a normal distribution
+
+
+def _told_from_none(first: dict[str, float], second: dict[str, float]) -> float:
+    """The share of time saved that two runs of the same tasks can tell from none: two standard errors of their mean.
+
+    By the median of what differs, since a busy moment of the machine is no error of all tasks.
+    """
+    apart = [(a - b) / (a + b) for a, b in zip(first.values(), second.values(), strict=True)]
+    middle = statistics.median(apart)  # what slows all tasks of a run alike changes no saving
+    return 2 * math.sqrt(2) * _NORMAL * statistics.median(abs(x - middle) for x in apart)
 
 
 def _directions(whole: Material, count: int, seed: int) -> tuple[Tensor, Tensor]:
@@ -155,9 +167,9 @@ def _task(made: Material, wi: Tensor, wo: Tensor) -> Callable[[], object]:
     return run
 
 
-def _sentence(errors: dict[str, float], saved: dict[str, float]) -> str:
-    """What to leave out first, and what to keep."""
-    worth = {effect: share for effect, share in saved.items() if share > _LEAST}
+def _sentence(errors: dict[str, float], saved: dict[str, float], least: float) -> str:
+    """What to leave out first, and what to keep; savings up to `least` are the clock's noise."""
+    worth = {effect: share for effect, share in saved.items() if share > least}
     dearest = max(errors, key=lambda effect: errors[effect])
     keep = f"keep {dearest}, which changes f by {100 * errors[dearest]:.2g} %"
     if not worth:
@@ -171,7 +183,9 @@ def _sentence(errors: dict[str, float], saved: dict[str, float]) -> str:
     if not free:
         return f"{sentence}."
     many = len(free) > 1
-    costs = f"; {_listed(free)} {'cost' if many else 'costs'} no time, so keep {'them' if many else 'it'} too"
+    costs = (
+        f"; {_listed(free)} {'cost' if many else 'costs'} no time that shows, so keep {'them' if many else 'it'} too"
+    )
     return f"{sentence}{costs}."
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from ..plots._panels import Curve, Panel
-from ._study import Cell, Chart, Study
+from ._study import Cell, Chart, Study, two_digits
 from ._textbook import exact, relative_errors
 from ._timing import interleaved
 from ._ward_methods import (
@@ -163,5 +163,5 @@ def _printed_forms(rows: Sequence[Row]) -> str:
         f"The textbook's angles (Walter eq. 3) lose up to {worst[angles]:.1g} in float64 and "
         f"{worst[(EQ_3, 'float32')]:.1g} in float32; his eq. 4 is exact to {worst[vector]:.1g} and takes "
         f"{mean[vector] / mean[angles]:.2g}x the time of eq. 3; Ward's approximation is off by up to "
-        f"{worst[approximation]:.1g} and takes {mean[approximation] / mean[vector]:.2g}x the time of eq. 4."
+        f"{two_digits(worst[approximation])} and takes {mean[approximation] / mean[vector]:.2g}x the time of eq. 4."
     )

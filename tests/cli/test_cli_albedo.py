@@ -59,6 +59,15 @@ def test_it_says_where_the_albedo_exceeds_one_and_which_azimuth_it_is(run: Run) 
     assert "tolerance 0.01 met" in out
 
 
+def test_no_digit_is_cut_off_where_the_screen_is_narrow(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    _, out, _ = run("lambert(kd=[0.5, 0.25, 0.125])", "--theta-deg=0,60", "--tolerance=1e-10")
+    assert "…" not in out
+    assert "theta [degrees]" in out
+    rows = [line.split() for line in out.splitlines() if line.split()[:1] in (["0"], ["60"])]
+    assert [row[1:4] for row in rows] == [["0.50000000000", "0.25000000000", "0.12500000000"]] * 2
+
+
 def test_json_is_the_librarys_result(run: Run) -> None:
     _, out, _ = run(DIFFUSE, "--theta-deg", "30", "--phi-deg", "10", "--tolerance", "1e-4", "--json")
     found = json.loads(out)
@@ -98,6 +107,8 @@ MISTAKES = {
     "unknown model": (("lambrt",), "Did you mean 'lambert'"),
     "angles": (("lambert", "--theta-deg", "0;30"), "--theta-deg to be numbers separated by commas, got '0;30'"),
     "the horizon": (("lambert", "--theta-deg", "90"), "--theta-deg to be angles in [0, 90), got 90"),
+    "no azimuth": (("lambert", "--phi-deg", "nan"), "--phi-deg to be a finite angle, got nan. Give the azimuth in deg"),
+    "axis twice": (("lambert", "--table", "t.npz", "--axis", "lambert.kd", "--axis", "lambert.kd"), "lambert.kd twice"),
     "axis without a table": (("lambert", "--axis", "lambert.kd"), "--axis to go with --table"),
     "axis without a range": (("lambert", "--table", "t.npz", "--axis", "lambert.kd=1"), "KEY=LOW:HIGH or KEY"),
     "axis in radians": (("lambert", "--table", "t.npz", "--axis", "theta=0:1"), "named theta_deg"),

@@ -7,7 +7,7 @@ import pytest
 
 import brdfcore as bc
 from brdfcore.cli import main
-from brdfcore.cli._certificate import _says
+from brdfcore.cli._certificate import ANGLES_DEG, _says
 
 
 @pytest.fixture
@@ -49,8 +49,14 @@ def test_the_verdict_comes_first_and_each_term_beside_what_its_text_says(typed) 
 def test_one_term_is_found_once(typed) -> None:
     code, out, _ = typed("oren_nayar(kd=1, sigma=0.2)")
     assert code == 1
-    assert "above 1               from 7" in out
+    assert "above 1               first at 7" in out
     assert "\nfound" not in out
+
+
+def test_albedos_that_are_small_stand_apart(typed) -> None:
+    _, out, _ = typed("ward(rs=1e-6, a=0.01)")
+    (row,) = (line for line in out.splitlines() if line.startswith("albedo "))
+    assert len(row.split()) == 1 + len(ANGLES_DEG)
 
 
 def test_json_is_the_librarys_certificate(typed) -> None:

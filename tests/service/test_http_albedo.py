@@ -186,7 +186,7 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "outside its box": ({"material": "lambert(kd=2)"}, "lambert.kd", "in [0, 1], got 2"),
     "neither values nor table": ({"theta_deg": None}, "body", "exactly one"),
     "values and a table": ({"axes": {}}, "body", "exactly one"),
-    "no angles": ({"theta_deg": []}, "theta_deg", "at least 1 item"),
+    "no angles": ({"theta_deg": []}, "theta_deg", "theta_deg to have at least 1 item, got 0. Correct"),
     "the horizon": ({"theta_deg": [0.0, 90.0]}, "theta_deg[1]", "less than 90, got 90"),
     "below the normal": ({"theta_deg": [-1.0]}, "theta_deg[0]", "greater than or equal to 0"),
     "text for a number": ({"theta_deg": ["30"]}, "theta_deg[0]", "number, got '30'"),

@@ -5,7 +5,7 @@ import torch
 
 import brdfcore as bc
 from brdfcore.study import STUDIES
-from brdfcore.study.effects import EFFECTS, _directions, _error, _sentence, _Simpler
+from brdfcore.study.effects import EFFECTS, _directions, _error, _sentence, _Simpler, _told_from_none
 
 
 def test_errors_are_those_of_the_materials_that_remain() -> None:
@@ -48,14 +48,29 @@ def test_a_small_study() -> None:
 
 def test_the_sentence_is_computed() -> None:
     errors = {"colour": 0.7, "Fresnel": 0.02, "anisotropy": 0.3}
-    text = _sentence(errors, {"colour": 0.1, "Fresnel": 0.2, "anisotropy": 0.0})
+    text = _sentence(errors, {"colour": 0.1, "Fresnel": 0.2, "anisotropy": 0.0}, 0.01)
     assert text == (
         "Leave out Fresnel first: it saves 20 % of the time for an error of 2 %; keep colour, which changes f by 70 %; "
-        "anisotropy costs no time, so keep it too."
+        "anisotropy costs no time that shows, so keep it too."
     )
-    assert _sentence(errors, {"colour": 0.4, "Fresnel": 0.002, "anisotropy": 0.1}).startswith("Leave out colour first")
-    assert "Fresnel and anisotropy cost no time, so keep them too." in _sentence(
-        errors, {"colour": 0.4, "Fresnel": -0.1, "anisotropy": 0.0}
+    assert _sentence(errors, {"colour": 0.4, "Fresnel": 0.002, "anisotropy": 0.1}, 0.01).startswith(
+        "Leave out colour first"
     )
-    assert _sentence(errors, {"colour": 0.1, "Fresnel": 0.2, "anisotropy": 0.1}).endswith("changes f by 70 %.")
-    assert _sentence(errors, dict.fromkeys(errors, 0.0)).startswith("Leave nothing out for speed")
+    assert "Fresnel and anisotropy cost no time that shows, so keep them too." in _sentence(
+        errors, {"colour": 0.4, "Fresnel": -0.1, "anisotropy": 0.04}, 0.05
+    )
+    assert _sentence(errors, {"colour": 0.1, "Fresnel": 0.2, "anisotropy": 0.1}, 0.01).endswith("changes f by 70 %.")
+    assert _sentence(errors, dict.fromkeys(errors, 0.0), 0.01).startswith("Leave nothing out for speed")
+
+
+def test_what_the_clock_can_tell_is_measured() -> None:
+    """Two standard errors of a saving, from runs whose times differ by 2 % of a standard error each."""
+    generator = torch.Generator().manual_seed(1)
+    first, second = (
+        {str(k): 1 + 0.02 * float(x) for k, x in enumerate(torch.randn(4000, generator=generator))} for _ in range(2)
+    )
+    assert _told_from_none(first, second) == pytest.approx(2 * 0.02, rel=0.05)
+    slowed = {name: 3 * seconds for name, seconds in second.items()}
+    assert _told_from_none(first, slowed) < 0.05, "a run that is slower as a whole says nothing of savings"
+    assert _told_from_none(first, second | {"7": 9.0}) == pytest.approx(2 * 0.02, rel=0.05), "nor does one busy moment"
+    assert _told_from_none(first, first) == 0
