@@ -160,8 +160,12 @@ def test_metrics_count_requests_jobs_and_failures(http: TestClient, request_body
     steep = request_body | {"max_theta_deg": 0.01}
     failed = http.post("/v1/fits", json=steep, headers={"prefer": "wait=20"}).json()
     assert failed["status"] == "failed"
+    for method in ("INVENTED", "MADE-UP"):
+        assert http.request(method, "/v1/fits").status_code == 405
     text = http.get("/metrics").text
+    assert "INVENTED" not in text
     for line in (
+        'brdf_request_seconds_count{method="other",route="/v1/fits",status="405"} 2.0',
         'brdf_jobs{kind="fit",status="succeeded"} 2.0',
         'brdf_jobs{kind="fit",status="failed"} 1.0',
         "brdf_queue_depth 0.0",
