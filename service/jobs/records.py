@@ -138,5 +138,7 @@ def prepare(db: sqlite3.Connection) -> None:
         for statement in _TABLE.split(";") if not made else ():
             db.execute(statement)
         db.execute(f"PRAGMA user_version = {_VERSION}")
-    finally:
         db.execute("COMMIT")
+    finally:
+        if db.in_transaction:  # half a table would be of no version
+            db.execute("ROLLBACK")

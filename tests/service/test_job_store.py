@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from brdfcore.errors import InvalidValueError
-from service.jobs.records import Attempt, Job
+from service.jobs.records import _TABLE, Attempt, Job
 from service.jobs.retries import MOST_CRASHES, MOST_INTERRUPTED
 from service.jobs.store import JobStore
 
@@ -267,6 +267,15 @@ def test_what_ended_long_ago_is_forgotten(store: JobStore, clock: Clock) -> None
     assert store.get(queued) is not None
     assert store.forget(clock.now - 50) == 0
     assert [store.asks_for(name) for name in ("aa", "bb", "cc")] == [False, True, True]
+
+
+def test_a_table_is_made_whole_or_not_at_all(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "jobs.sqlite3"
+    with monkeypatch.context() as broken:
+        broken.setattr("service.jobs.records._TABLE", f"{_TABLE}; CREATE TABLE fails (")
+        with pytest.raises(sqlite3.OperationalError, match="incomplete input"):
+            JobStore(path)
+    JobStore(path).close()
 
 
 def test_a_store_of_another_version_is_refused(tmp_path: pathlib.Path) -> None:
