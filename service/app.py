@@ -16,7 +16,7 @@ from starlette.types import ASGIApp
 
 import brdfcore as bc
 
-from . import errors, examples, renders
+from . import disk, errors, examples
 from .datasets import Datasets
 from .guard import Guard, JsonLines
 from .jobs.dispatcher import Dispatcher
@@ -73,8 +73,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             if chosen.keep_days:
                 before = time.time() - 86400 * chosen.keep_days
                 jobs, files = store.forget(before), datasets.forget(before, store.asks_for)
-                renders.forget(chosen.data, before, functools.partial(store.mentioned, "render"))
-                _log.info("removed %d jobs and %d datasets older than %g days", jobs, files, chosen.keep_days)
+                files += disk.forget(chosen.data / "renders", before, functools.partial(store.mentioned, "render"))
+                files += disk.forget(chosen.data / "tables", before, functools.partial(store.mentioned, "albedo_table"))
+                _log.info("removed %d jobs and %d files older than %g days", jobs, files, chosen.keep_days)
 
         def ended(job_id: str, reason: str) -> None:
             job = store.get(job_id)
