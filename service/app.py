@@ -16,9 +16,9 @@ from starlette.types import ASGIApp
 
 import brdfcore as bc
 
-from . import disk, errors, examples
+from . import disk, errors, examples, log
 from .datasets import Datasets
-from .guard import Guard, JsonLines
+from .guard import Guard
 from .jobs.dispatcher import Dispatcher
 from .jobs.runner import LocalRunner, Runner
 from .jobs.store import JobStore
@@ -28,6 +28,7 @@ from .settings import Settings
 from .state import State
 
 _log = logging.getLogger("service")
+_JOBS = "jobs.sqlite3"
 _LARGE = 2**14  # bytes from which an answer is compressed for who admits it
 _PACKED = (*DEFAULT_EXCLUDED_CONTENT_TYPES, "application/x-npz", "application/x-npy", "application/octet-stream")
 
@@ -57,16 +58,15 @@ class _App(FastAPI):
         return Guard(super().build_middleware_stack(), self.state.settings, self.state.metrics)
 
 
-def create_app(settings: Settings | None = None) -> FastAPI:
-    """The application; while it runs, so do its fits. Without settings the environment's hold."""
+def create_app(settings: Settings | None = None, runner: Runner | None = None) -> FastAPI:
+    """The application; while it runs, so do its fits. Without settings the environment's hold, and name the runner."""
     chosen = settings or Settings.from_environment()
     metrics = Metrics()
 
     @contextlib.asynccontextmanager
     async def running(app: FastAPI) -> AsyncIterator[None]:
         datasets = Datasets(chosen.data)
-        store = JobStore(chosen.data / "jobs.sqlite3")
-        runner = _runner(chosen)
+        store = JobStore(chosen.data / _JOBS)
         metrics.watch(store)
 
         def sweep() -> None:
@@ -90,7 +90,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
         dispatcher = Dispatcher(
             store,
-            runner,
+            runner or _runner(chosen),
             chosen.data / "lock",
             workers=chosen.workers,
             fit_seconds=chosen.fit_seconds,
@@ -127,14 +127,16 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 
 def server(settings: Settings) -> uvicorn.Server:
-    """A server of the application; told to end, it does so within 5 s, and unfinished fits stay queued."""
+    """A server of the application; told to end, it does so within 5 s, and unfinished fits stay queued.
+
+    Raises InvalidValueError for settings with which it cannot start.
+    """
     settings.check_open()
-    lines = logging.StreamHandler()
-    lines.setFormatter(JsonLines())
-    _log.handlers = [lines]
-    _log.propagate = False
-    _log.setLevel(settings.log_level.upper())
-    app = create_app(settings)
+    log.begin(settings.log_level)
+    settings.data.mkdir(parents=True, exist_ok=True)
+    # what cannot be started says so here in its sentence; once the application starts it would be a traceback
+    JobStore(settings.data / _JOBS).close()
+    app = create_app(settings, _runner(settings))
     config = uvicorn.Config(
         app,
         host=settings.host,
@@ -142,7 +144,7 @@ def server(settings: Settings) -> uvicorn.Server:
         timeout_graceful_shutdown=2,
         limit_concurrency=500,
         server_header=False,
-        log_level="warning",
+        log_config=None,
     )
     made = uvicorn.Server(config)
     app.state.ending = lambda: made.should_exit  # who waits for a fit is answered as things stand

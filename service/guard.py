@@ -1,6 +1,5 @@
 """What stands before every route: a request's id, the key, the size of headers, and what every answer carries."""
 
-import json
 import logging
 import re
 import time
@@ -101,20 +100,3 @@ class Guard:
 def _open(path: str) -> bool:
     """Whether anybody may ask for it."""
     return path in OPEN or path.startswith(PAGE)
-
-
-class JsonLines(logging.Formatter):
-    """One JSON object a line: time, level, logger, message, and the fields that the record carries."""
-
-    def format(self, record: logging.LogRecord) -> str:
-        """The line."""
-        said = {
-            "time": self.formatTime(record, "%Y-%m-%dT%H:%M:%S%z"),
-            "level": record.levelname.lower(),
-            "logger": record.name,
-            "message": record.getMessage(),
-            **getattr(record, "fields", {}),
-        }
-        if record.exc_info:
-            said["exception"] = self.formatException(record.exc_info)
-        return json.dumps(said, ensure_ascii=True)

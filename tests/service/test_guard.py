@@ -15,7 +15,8 @@ from starlette.testclient import TestClient
 from brdfcore.errors import InvalidValueError
 from service import keys
 from service.app import create_app
-from service.guard import HEADER_LIMIT, OPEN, JsonLines
+from service.guard import HEADER_LIMIT, OPEN
+from service.log import JsonLines
 from service.settings import Settings
 
 KEY, OTHER = "k" * 24, "another-long-key-0123456789"
