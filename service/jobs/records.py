@@ -15,7 +15,6 @@ CREATE TABLE jobs (
     kind      TEXT NOT NULL,
     status    TEXT NOT NULL DEFAULT 'queued'
               CHECK (status IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
-    body      BLOB NOT NULL,
     request   TEXT NOT NULL,
     progress  TEXT,
     result    TEXT,
@@ -31,7 +30,8 @@ CREATE TABLE jobs (
     reused    TEXT,
     promise   TEXT UNIQUE,
     promised  TEXT,
-    batch     TEXT
+    batch     TEXT,
+    body      BLOB NOT NULL  -- the last, because SQLite walks through what stands before the column that it looks for
 ) STRICT;
 CREATE TABLE batches (
     number    INTEGER PRIMARY KEY AUTOINCREMENT,

@@ -139,7 +139,9 @@ def _settle(memory: int) -> None:
 def limit(memory: int) -> None:
     """Bound what this process may allocate [bytes]."""
     # not RLIMIT_AS: torch maps more addresses than any sensible bound
-    resource.setrlimit(resource.RLIMIT_DATA, (memory, resource.RLIM_INFINITY))
+    _, most = resource.getrlimit(resource.RLIMIT_DATA)  # what the system sets already, nobody may raise
+    bound = memory if most == resource.RLIM_INFINITY else min(memory, most)
+    resource.setrlimit(resource.RLIMIT_DATA, (bound, most))
     torch.set_num_threads(1)
 
 

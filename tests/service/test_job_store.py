@@ -269,6 +269,10 @@ def test_what_ended_long_ago_is_forgotten(store: JobStore, clock: Clock) -> None
     assert [store.asks_for(name) for name in ("aa", "bb", "cc")] == [False, True, True]
 
 
+def test_what_is_asked_often_does_not_stand_behind_the_body(store: JobStore) -> None:
+    assert store._reader.execute("SELECT name FROM pragma_table_info('jobs')").fetchall()[-1] == ("body",)
+
+
 def test_a_table_is_made_whole_or_not_at_all(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "jobs.sqlite3"
     with monkeypatch.context() as broken:
