@@ -55,7 +55,7 @@ class _App(FastAPI):
 
     def build_middleware_stack(self) -> ASGIApp:
         """The application that the server calls."""
-        return Guard(super().build_middleware_stack(), self.state.settings, self.state.metrics)
+        return Guard(super().build_middleware_stack(), self.state.settings, self.state.metrics, self.state.hosts)
 
 
 def create_app(settings: Settings | None = None, runner: Runner | None = None) -> FastAPI:
@@ -112,7 +112,7 @@ def create_app(settings: Settings | None = None, runner: Runner | None = None) -
     app = _App(
         title="brdfcore", version=bc.__version__, summary=summary, lifespan=running, docs_url=None, redoc_url=None
     )
-    app.state.ending = lambda: False
+    app.state.ending, app.state.hosts = lambda: False, ()
     app.state.metrics, app.state.settings = metrics, chosen
     errors.install(app)
     app.add_middleware(
@@ -137,6 +137,8 @@ def server(settings: Settings) -> uvicorn.Server:
     # what cannot be started says so here in its sentence; once the application starts it would be a traceback
     JobStore(settings.data / _JOBS).close()
     app = create_app(settings, _runner(settings))
+    if not settings.api_keys:  # a page of any site may give its name this machine's address, and read as its own
+        app.state.hosts = dict.fromkeys((settings.host, "127.0.0.1", "localhost", "[::1]"))
     config = uvicorn.Config(
         app,
         host=settings.host,

@@ -121,6 +121,18 @@ def test_every_answer_carries_its_id_and_the_security_headers(
     assert re.fullmatch("[0-9a-f]{32}", made)
 
 
+def test_without_a_key_a_server_answers_to_its_own_names_only(settings: Settings) -> None:
+    app = create_app(settings)
+    app.state.hosts = ("127.0.0.1", "[::1]")
+    with TestClient(app) as client:
+        for host in ("127.0.0.1", "127.0.0.1:8000", "[::1]:8000"):
+            assert client.get("/v1/models", headers={"host": host}).status_code == 200
+        for host in ("evil.example", "evil.example:8000", "127.0.0.1.evil.example", ""):
+            answer = client.get("/v1/models", headers={"host": host})
+            assert answer.status_code == 421
+            assert answer.json()["detail"].startswith(f"Expected Host to be 127.0.0.1 or [::1], got {host!r}")
+
+
 def test_headers_are_bounded(http: TestClient) -> None:
     answer = http.get("/healthz", headers={"x-long": "a" * HEADER_LIMIT})
     assert answer.status_code == 431

@@ -41,6 +41,7 @@ def test_every_line_of_the_log_is_json(
 ) -> None:
     monkeypatch.setattr("service.app._runner", lambda settings: None)
     made = server(Settings(data=tmp_path))
+    assert list(made.config.app.state.hosts) == ["127.0.0.1", "localhost", "[::1]"]  # type: ignore[union-attr]
     made.config.load()
     logging.getLogger("uvicorn.error").warning("Invalid HTTP request received.")
     logging.getLogger("uvicorn.access").info("GET / 200")
