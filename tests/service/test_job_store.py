@@ -200,10 +200,21 @@ def test_deleting_removes_the_job_and_its_body(store: JobStore) -> None:
     job = store.submit("{}", b"secret")
     attempt = claimed(store)
     assert store.body(job.id) == b"secret"
-    assert store.delete(job.id)
-    assert not store.delete(job.id)
+    gone = store.delete(job.id)
+    assert gone is not None
+    assert (gone.id, gone.status) == (job.id, "running")
+    assert store.delete(job.id) is None
     assert (store.get(job.id), store.body(job.id)) == (None, None)
     assert not store.succeed(attempt, "{}")
+
+
+def test_a_removed_job_has_the_result_that_came_last_and_a_listed_one_has_none(store: JobStore) -> None:
+    job = store.submit("{}", b"")
+    assert store.succeed(claimed(store), '{"hash": "1"}')
+    assert [(listed.status, listed.result) for listed in store.newest(1)] == [("succeeded", None)]
+    gone = store.delete(job.id)
+    assert gone is not None
+    assert gone.result == '{"hash": "1"}'
 
 
 def test_the_list_is_paged_newest_first(store: JobStore) -> None:
