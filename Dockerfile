@@ -1,7 +1,9 @@
 # The service in a slim image that runs as an ordinary user.
 #
 #   docker build -t brdf .
-#   docker run --rm -p 127.0.0.1:8000:8000 -v brdf-data:/data brdf
+#   docker run --rm -p 127.0.0.1:8000:8000 -v brdf-data:/data -e BRDF_API_KEYS="a long random key" brdf
+#
+# It listens on every address, so without a key it does not start.
 
 FROM python:3.12-slim AS build
 WORKDIR /source

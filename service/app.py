@@ -16,9 +16,9 @@ from starlette.types import ASGIApp
 
 import brdfcore as bc
 
-from . import errors, examples, renders
+from . import disk, errors, examples, log
 from .datasets import Datasets
-from .guard import Guard, JsonLines
+from .guard import Guard
 from .jobs.dispatcher import Dispatcher
 from .jobs.runner import LocalRunner, Runner
 from .jobs.store import JobStore
@@ -28,6 +28,7 @@ from .settings import Settings
 from .state import State
 
 _log = logging.getLogger("service")
+_JOBS = "jobs.sqlite3"
 _LARGE = 2**14  # bytes from which an answer is compressed for who admits it
 _PACKED = (*DEFAULT_EXCLUDED_CONTENT_TYPES, "application/x-npz", "application/x-npy", "application/octet-stream")
 
@@ -54,27 +55,27 @@ class _App(FastAPI):
 
     def build_middleware_stack(self) -> ASGIApp:
         """The application that the server calls."""
-        return Guard(super().build_middleware_stack(), self.state.settings, self.state.metrics)
+        return Guard(super().build_middleware_stack(), self.state.settings, self.state.metrics, self.state.hosts)
 
 
-def create_app(settings: Settings | None = None) -> FastAPI:
-    """The application; while it runs, so do its fits. Without settings the environment's hold."""
+def create_app(settings: Settings | None = None, runner: Runner | None = None) -> FastAPI:
+    """The application; while it runs, so do its fits. Without settings the environment's hold, and name the runner."""
     chosen = settings or Settings.from_environment()
     metrics = Metrics()
 
     @contextlib.asynccontextmanager
     async def running(app: FastAPI) -> AsyncIterator[None]:
         datasets = Datasets(chosen.data)
-        store = JobStore(chosen.data / "jobs.sqlite3")
-        runner = _runner(chosen)
+        store = JobStore(chosen.data / _JOBS)
         metrics.watch(store)
 
         def sweep() -> None:
             if chosen.keep_days:
                 before = time.time() - 86400 * chosen.keep_days
                 jobs, files = store.forget(before), datasets.forget(before, store.asks_for)
-                renders.forget(chosen.data, before, functools.partial(store.mentioned, "render"))
-                _log.info("removed %d jobs and %d datasets older than %g days", jobs, files, chosen.keep_days)
+                files += disk.forget(chosen.data / "renders", before, functools.partial(store.mentioned, "render"))
+                files += disk.forget(chosen.data / "tables", before, functools.partial(store.mentioned, "albedo_table"))
+                _log.info("removed %d jobs and %d files older than %g days", jobs, files, chosen.keep_days)
 
         def ended(job_id: str, reason: str) -> None:
             job = store.get(job_id)
@@ -89,7 +90,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
         dispatcher = Dispatcher(
             store,
-            runner,
+            runner or _runner(chosen),
             chosen.data / "lock",
             workers=chosen.workers,
             fit_seconds=chosen.fit_seconds,
@@ -111,7 +112,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app = _App(
         title="brdfcore", version=bc.__version__, summary=summary, lifespan=running, docs_url=None, redoc_url=None
     )
-    app.state.ending = lambda: False
+    app.state.ending, app.state.hosts = lambda: False, ()
     app.state.metrics, app.state.settings = metrics, chosen
     errors.install(app)
     app.add_middleware(
@@ -126,14 +127,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 
 def server(settings: Settings) -> uvicorn.Server:
-    """A server of the application; told to end, it does so within 5 s, and unfinished fits stay queued."""
+    """A server of the application; told to end, it does so within 5 s, and unfinished fits stay queued.
+
+    Raises InvalidValueError for settings with which it cannot start.
+    """
     settings.check_open()
-    lines = logging.StreamHandler()
-    lines.setFormatter(JsonLines())
-    _log.handlers = [lines]
-    _log.propagate = False
-    _log.setLevel(settings.log_level.upper())
-    app = create_app(settings)
+    log.begin(settings.log_level)
+    settings.data.mkdir(parents=True, exist_ok=True)
+    # what cannot be started says so here in its sentence; once the application starts it would be a traceback
+    JobStore(settings.data / _JOBS).close()
+    app = create_app(settings, _runner(settings))
+    if not settings.api_keys:  # a page of any site may give its name this machine's address, and read as its own
+        app.state.hosts = dict.fromkeys((settings.host, "127.0.0.1", "localhost", "[::1]"))
     config = uvicorn.Config(
         app,
         host=settings.host,
@@ -141,7 +146,7 @@ def server(settings: Settings) -> uvicorn.Server:
         timeout_graceful_shutdown=2,
         limit_concurrency=500,
         server_header=False,
-        log_level="warning",
+        log_config=None,
     )
     made = uvicorn.Server(config)
     app.state.ending = lambda: made.should_exit  # who waits for a fit is answered as things stand

@@ -60,7 +60,9 @@ class Datasets:
         name = hashlib.sha256(f"{sha256} {json.dumps(declared, sort_keys=True)}".encode()).hexdigest()
         known = self.get(name)
         if known:
-            return known, False
+            with contextlib.suppress(FileNotFoundError):
+                os.utime(self._kept / name)  # who uploads it again is about to ask for it
+                return known, False
         data = folder / "data"
         _check_unpacked(data, most)
         samples = read(data, **declared)
@@ -98,7 +100,8 @@ class Datasets:
         """How many datasets were uploaded before that time [s since 1970] and no job asks for; they are removed."""
         old = [f for f in self._kept.iterdir() if f.stat().st_mtime < before and not asked_for(f.name)]
         for folder in old:
-            shutil.rmtree(folder, ignore_errors=True)
+            with self.incoming() as gone:  # gone at once: what is under datasets/ is always whole
+                folder.rename(gone / "data")
         return len(old)
 
     def files(self, name: str) -> dict[str, bytes]:

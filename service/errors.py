@@ -6,7 +6,7 @@ RequestValidationError    422, `errors` lists every field at fault
 404, 405 (with Allow)     from the router
 503, 507                  the store is locked for long; the disk is full: nothing of the request is kept
 anything else             500, details in the log only
-and before any route      401 without a known key, 431 for too large headers (guard.py)
+and before any route      401 without a known key, 421 for another's host, 431 for too large headers (guard.py)
 """
 
 import http
@@ -58,7 +58,7 @@ def install(app: FastAPI) -> None:
 def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """What OpenAPI says of a route's errors."""
     content = {PROBLEM_TYPE: {"schema": inlined(Problem)}}
-    every = (401, 431, *statuses)  # the guard's come before any route
+    every = (401, 421, 431, *statuses)  # the guard's come before any route
     return {status: {"description": http.HTTPStatus(status).phrase, "content": content} for status in every}
 
 

@@ -1,10 +1,10 @@
 """What stands before every route: a request's id, the key, the size of headers, and what every answer carries."""
 
-import json
 import logging
 import re
 import time
 import uuid
+from collections.abc import Collection
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -33,8 +33,9 @@ _log = logging.getLogger("service.requests")
 class Guard:
     """ASGI middleware that refuses what must not reach a route, and logs and counts what was answered."""
 
-    def __init__(self, app: ASGIApp, settings: Settings, metrics: Metrics) -> None:
-        self.app, self.settings, self.metrics = app, settings, metrics
+    def __init__(self, app: ASGIApp, settings: Settings, metrics: Metrics, hosts: Collection[str] = ()) -> None:
+        """Stand before `app`; where `hosts` are given, a request names one of them as its host."""
+        self.app, self.settings, self.metrics, self.hosts = app, settings, metrics, hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
@@ -89,6 +90,13 @@ class Guard:
         size = sum(len(name) + len(value) for name, value in scope["headers"])
         if size > HEADER_LIMIT:
             return problem(431, f"Expected headers of at most {HEADER_LIMIT} bytes, got {size}. Send less in them.")
+        host = Headers(scope=scope).get("host", "")
+        if self.hosts and re.sub(r":\d*$", "", host.lower()) not in self.hosts:
+            return problem(
+                421,
+                f"Expected Host to be {' or '.join(self.hosts)}, got {host[:100]!r}: without an API key the service "
+                "answers to its own names only. Use one of them, or set BRDF_API_KEYS.",
+            )
         if self.settings.api_keys and owner is None and not _open(scope["path"]):
             return problem(
                 401,
@@ -101,20 +109,3 @@ class Guard:
 def _open(path: str) -> bool:
     """Whether anybody may ask for it."""
     return path in OPEN or path.startswith(PAGE)
-
-
-class JsonLines(logging.Formatter):
-    """One JSON object a line: time, level, logger, message, and the fields that the record carries."""
-
-    def format(self, record: logging.LogRecord) -> str:
-        """The line."""
-        said = {
-            "time": self.formatTime(record, "%Y-%m-%dT%H:%M:%S%z"),
-            "level": record.levelname.lower(),
-            "logger": record.name,
-            "message": record.getMessage(),
-            **getattr(record, "fields", {}),
-        }
-        if record.exc_info:
-            said["exception"] = self.formatException(record.exc_info)
-        return json.dumps(said, ensure_ascii=True)

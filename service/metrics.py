@@ -8,6 +8,15 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from .jobs.store import JobStore
 
 _SECONDS = (0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 100, 300, 1000, 3000)
+_METHODS = (
+    "DELETE",
+    "GET",
+    "HEAD",
+    "OPTIONS",
+    "PATCH",
+    "POST",
+    "PUT",
+)  # any other is "other": a client may invent them
 _MOST_MODELS = 50  # further models are counted as "other": a label for every text that is sent would grow for ever
 
 
@@ -41,7 +50,7 @@ class Metrics:
 
     def answered(self, method: str, route: str, status: int, seconds: float) -> None:
         """Count a request."""
-        self._requests.labels(method, route, str(status)).observe(seconds)
+        self._requests.labels(method if method in _METHODS else "other", route, str(status)).observe(seconds)
 
     def succeeded(self, kind: str, model: str, seconds: float) -> None:
         """Count a job that ran for so long."""

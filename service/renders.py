@@ -85,15 +85,6 @@ def remove(data: Path, name: str) -> None:
         _path(data, name, kind).unlink(missing_ok=True)
 
 
-def forget(data: Path, before: float, mentioned: Callable[[str], bool]) -> int:
-    """How many files of images older than that time [s since 1970], which no job mentions, are removed."""
-    old = [path for path in (data / "renders").glob("*.*") if path.stat().st_mtime < before]
-    gone = [path for path in old if not mentioned(path.stem)]
-    for path in gone:
-        path.unlink(missing_ok=True)
-    return len(gone)
-
-
 def _path(data: Path, name: str, kind: str) -> Path:
     return data / "renders" / f"{name}.{kind}"
 

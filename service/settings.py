@@ -55,6 +55,8 @@ class Settings:
         for name in ("workers", "upload_limit", "inline_rows", "fit_seconds", "fit_memory", "queue_limit"):
             if not getattr(self, name) > 0:
                 raise _refused(name, "above 0", getattr(self, name))
+        if not self.fit_memory < 2**63:  # what the system can be told
+            raise _refused("fit_memory", "below 2^63", self.fit_memory)
         if not 0 <= self.port <= 65535:
             raise _refused("port", "within 0..65535", self.port)
         for name in ("ray_cpus", "ray_gpus"):

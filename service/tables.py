@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,9 @@ def made(asked: AlbedoRequest, data: Path, progress: Callable[[float], None]) ->
     (data / "tables").mkdir(exist_ok=True)
     table = bc.albedo_table(material, axes, tolerance, cache=data / "tables", progress=progress)
     path = _path(data, table.hash)
-    if not path.exists():  # it could not be kept: this raises why
+    try:
+        os.utime(path)  # one that is asked for again is new: what is old and no job's is removed
+    except FileNotFoundError:  # it could not be kept: this raises why
         table.save(path)
     return {
         "hash": table.hash,

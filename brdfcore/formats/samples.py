@@ -339,4 +339,9 @@ def _channel_names(given: Iterable[str] | None, count: int) -> tuple[str, ...]:
             f"Expected channels to be distinct, non-empty names, got {names!r}. Name each column once.",
             field="channels",
         )
+    if not all(name.isprintable() for name in names):  # no JSON and no UTF-8 holds half of a surrogate pair
+        raise SamplesError(
+            f"Expected channels to be names that can be printed, got {names!r}. Name the columns in plain text.",
+            field="channels",
+        )
     return names

@@ -15,7 +15,6 @@ CREATE TABLE jobs (
     kind      TEXT NOT NULL,
     status    TEXT NOT NULL DEFAULT 'queued'
               CHECK (status IN ('queued', 'running', 'succeeded', 'failed', 'cancelled')),
-    body      BLOB NOT NULL,
     request   TEXT NOT NULL,
     progress  TEXT,
     result    TEXT,
@@ -31,7 +30,8 @@ CREATE TABLE jobs (
     reused    TEXT,
     promise   TEXT UNIQUE,
     promised  TEXT,
-    batch     TEXT
+    batch     TEXT,
+    body      BLOB NOT NULL  -- the last, because SQLite walks through what stands before the column that it looks for
 ) STRICT;
 CREATE TABLE batches (
     number    INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -138,5 +138,7 @@ def prepare(db: sqlite3.Connection) -> None:
         for statement in _TABLE.split(";") if not made else ():
             db.execute(statement)
         db.execute(f"PRAGMA user_version = {_VERSION}")
-    finally:
         db.execute("COMMIT")
+    finally:
+        if db.in_transaction:  # half a table would be of no version
+            db.execute("ROLLBACK")

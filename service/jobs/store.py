@@ -182,10 +182,10 @@ class JobStore:
     def newest(
         self, limit: int, before: int | None = None, kind: JobKind = "fit", status: JobStatus | None = None
     ) -> list[Job]:
-        """Up to `limit` jobs of a kind, and of a status, with numbers below `before`, newest first."""
+        """Up to `limit` jobs of a kind, and of a status, with numbers below `before`, newest first; without results."""
         rows = self._read(
-            f"SELECT {COLUMNS} FROM jobs WHERE number < ? AND kind = ? AND status = coalesce(?, status) "
-            "ORDER BY number DESC LIMIT ?",
+            f"SELECT {COLUMNS.replace('result', 'NULL')} FROM jobs "
+            "WHERE number < ? AND kind = ? AND status = coalesce(?, status) ORDER BY number DESC LIMIT ?",
             2**63 - 1 if before is None else before,
             kind,
             status,
@@ -299,10 +299,11 @@ class JobStore:
             )
         return self.get(job_id)
 
-    def delete(self, job_id: str) -> bool:
-        """Whether there was such a job; now there is none."""
+    def delete(self, job_id: str) -> Job | None:
+        """The job as it was; now there is none."""
         with self._write() as db:
-            return db.execute("DELETE FROM jobs WHERE id = ?", (job_id,)).rowcount == 1
+            rows = db.execute(f"DELETE FROM jobs WHERE id = ? RETURNING {COLUMNS}", (job_id,)).fetchall()
+        return _job(rows[0]) if rows else None
 
     def _held(self, change: str, attempt: Attempt, *values: object) -> bool:
         with self._write() as db:
@@ -330,4 +331,4 @@ class JobStore:
 
 
 def _job(row: Any) -> Job:
-    return Job(*row)  # the table is STRICT, and _COLUMNS names the fields in order
+    return Job(*row)  # the table is STRICT, and COLUMNS names the fields in order

@@ -22,7 +22,7 @@ from brdfcore.errors import BrdfError
 from brdfcore.fitting import Progress, fit
 from brdfcore.fitting.comparison import compare
 
-from .. import disk, renders, tables
+from .. import disk, log, renders, tables
 from ..datasets import Datasets
 from ..schemas import AlbedoRequest, FitRequest, JobKind, RenderRequest
 from .retries import ASK_FOR_LESS
@@ -131,6 +131,7 @@ def _settle(memory: int) -> None:
     """Make this process a quiet, bounded one that does not outlive the server."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole terminal; the server decides what follows
     os.nice(10)
+    log.begin("warning")
     limit(memory)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
@@ -138,7 +139,9 @@ def _settle(memory: int) -> None:
 def limit(memory: int) -> None:
     """Bound what this process may allocate [bytes]."""
     # not RLIMIT_AS: torch maps more addresses than any sensible bound
-    resource.setrlimit(resource.RLIMIT_DATA, (memory, resource.RLIM_INFINITY))
+    _, most = resource.getrlimit(resource.RLIMIT_DATA)  # what the system sets already, nobody may raise
+    bound = memory if most == resource.RLIM_INFINITY else min(memory, most)
+    resource.setrlimit(resource.RLIMIT_DATA, (bound, most))
     torch.set_num_threads(1)
 
 

@@ -157,8 +157,9 @@ async def cancelled(service: State, kind: JobKind, job_id: str) -> Job:
 
 async def removed(service: State, kind: JobKind, job_id: str) -> Job:
     """The job as it was before it was removed for good."""
-    job = found(service, kind, job_id)
-    if not await asyncio.to_thread(service.store.delete, job_id):
+    found(service, kind, job_id)
+    job = await asyncio.to_thread(service.store.delete, job_id)  # with the result that came since
+    if job is None:
         raise absent(kind, job_id)
     service.dispatcher.wake()
     return job

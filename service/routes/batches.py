@@ -22,6 +22,7 @@ from ._http import accepted_of, json_accepted, json_content, parsed
 router = APIRouter(prefix="/v1/batches", tags=["batches"])
 
 _JSON = [Depends(json_accepted)]
+_UNFINISHED = 0.99  # most that a fit counts which runs: after its last step it still has to be judged and kept
 _LIMIT = 2**20  # a thousand datasets and twenty models [bytes]
 _BODY = {"required": True, "content": {"application/json": {"schema": inlined(BatchRequest)}}}
 _TABLE = {"application/json": {"schema": inlined(BatchTable)}, "text/csv": {"schema": {"type": "string"}}}
@@ -41,6 +42,7 @@ async def submit(request: Request, response: Response) -> BatchView:
     service = state(request)
     service.dispatcher.wake()
     response.headers["location"] = f"/v1/batches/{batch.id}"
+    response.headers["retry-after"] = "1"
     return _view(service, batch)
 
 
@@ -131,7 +133,10 @@ def _absent(batch_id: str) -> ProblemError:
 
 def _view(service: State, batch: Batch) -> BatchView:
     jobs, request = service.store.standing(batch.id), json.loads(batch.request)
-    done = [1.0 if status in FINISHED else json.loads(said)["fraction"] if said else 0.0 for status, said in jobs]
+    done = [
+        1.0 if status in FINISHED else min(json.loads(said)["fraction"], _UNFINISHED) if said else 0.0
+        for status, said in jobs
+    ]
     return BatchView(
         id=batch.id,
         created=_jobs.time_of(batch.created),

@@ -49,7 +49,7 @@ class BatchView(View):
     datasets: int
     models: list[str]
     finished: bool = Field(description="whether no fit of it is queued or running")
-    fraction: float = Field(description="of the work that is done")
+    fraction: float = Field(description="of the work that is done; 1 when it is finished")
     counts: dict[JobStatus, int]
 
 

@@ -129,6 +129,8 @@ def angles_at(theta_i: object = 10.0, phi_i: object = 0.0, theta_o: object = 10.
         (lambda: Samples(UP, UP, [1.0], ("a", "b")), "channels", "1 names as values has 1 columns, got 2"),
         (lambda: Samples(UP, UP, [[1.0, 2.0]], ("a", "a")), "channels", "distinct, non-empty names, got ('a', 'a')"),
         (lambda: Samples(UP, UP, [1.0], ("",)), "channels", "distinct, non-empty"),
+        (lambda: Samples(UP, UP, [1.0], ("\ud800",)), "channels", r"names that can be printed, got ('\ud800',)"),
+        (lambda: Samples(UP, UP, [1.0], ("a\n",)), "channels", r"names that can be printed, got ('a\n',)"),
         (lambda: Samples(UP, UP, [1.0], sigma=[[1.0, 1.0]]), "sigma", "shape (1, 1) as values are, got (1, 2)"),
         (lambda: Samples(UP, UP, [1.0], sigma=[0.0]), "sigma", "positive and finite, got 0 at row 0"),
         (lambda: Samples(UP, UP, [1.0], sigma=[math.nan]), "sigma", "positive and finite, got nan"),

@@ -15,7 +15,8 @@ from starlette.testclient import TestClient
 from brdfcore.errors import InvalidValueError
 from service import keys
 from service.app import create_app
-from service.guard import HEADER_LIMIT, OPEN, JsonLines
+from service.guard import HEADER_LIMIT, OPEN
+from service.log import JsonLines
 from service.settings import Settings
 
 KEY, OTHER = "k" * 24, "another-long-key-0123456789"
@@ -120,6 +121,18 @@ def test_every_answer_carries_its_id_and_the_security_headers(
     assert re.fullmatch("[0-9a-f]{32}", made)
 
 
+def test_without_a_key_a_server_answers_to_its_own_names_only(settings: Settings) -> None:
+    app = create_app(settings)
+    app.state.hosts = ("127.0.0.1", "[::1]")
+    with TestClient(app) as client:
+        for host in ("127.0.0.1", "127.0.0.1:8000", "[::1]:8000"):
+            assert client.get("/v1/models", headers={"host": host}).status_code == 200
+        for host in ("evil.example", "evil.example:8000", "127.0.0.1.evil.example", ""):
+            answer = client.get("/v1/models", headers={"host": host})
+            assert answer.status_code == 421
+            assert answer.json()["detail"].startswith(f"Expected Host to be 127.0.0.1 or [::1], got {host!r}")
+
+
 def test_headers_are_bounded(http: TestClient) -> None:
     answer = http.get("/healthz", headers={"x-long": "a" * HEADER_LIMIT})
     assert answer.status_code == 431
@@ -160,8 +173,12 @@ def test_metrics_count_requests_jobs_and_failures(http: TestClient, request_body
     steep = request_body | {"max_theta_deg": 0.01}
     failed = http.post("/v1/fits", json=steep, headers={"prefer": "wait=20"}).json()
     assert failed["status"] == "failed"
+    for method in ("INVENTED", "MADE-UP"):
+        assert http.request(method, "/v1/fits").status_code == 405
     text = http.get("/metrics").text
+    assert "INVENTED" not in text
     for line in (
+        'brdf_request_seconds_count{method="other",route="/v1/fits",status="405"} 2.0',
         'brdf_jobs{kind="fit",status="succeeded"} 2.0',
         'brdf_jobs{kind="fit",status="failed"} 1.0',
         "brdf_queue_depth 0.0",

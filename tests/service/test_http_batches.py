@@ -38,6 +38,7 @@ def test_every_model_is_fitted_to_every_dataset(http: TestClient, datasets: list
     assert answer.status_code == 202
     batch = answer.json()
     assert answer.headers["location"] == f"/v1/batches/{batch['id']}"
+    assert answer.headers["retry-after"] == "1"
     assert (batch["datasets"], batch["models"], sum(batch["counts"].values())) == (3, body["models"], 6)
     done = finished(http, batch)
     assert (done["counts"], done["fraction"]) == ({"succeeded": 6}, 1.0)
@@ -96,6 +97,16 @@ def test_a_batch_is_accepted_whole_or_not_at_all(idle: TestClient) -> None:
     assert other.status_code == 409
     cancelled = idle.post(f"/v1/batches/{first.json()['id']}/cancel").json()
     assert (cancelled["counts"], cancelled["finished"]) == ({"cancelled": 3}, True)
+
+
+def test_a_fit_that_still_runs_is_not_all_of_its_work(idle: TestClient) -> None:
+    body = {"datasets": [upload(idle, 24)], "models": ["lambert", "ward_bounded"]}
+    batch = idle.post("/v1/batches", json=body).json()
+    store = idle.app.state.service.store  # type: ignore[attr-defined]
+    for expected in (0.495, 0.99):
+        assert store.progress(store.claim(), '{"stage": "fit", "fraction": 1.0, "loss": null}')
+        view = idle.get(f"/v1/batches/{batch['id']}").json()
+        assert (view["finished"], view["fraction"]) == (False, pytest.approx(expected))
 
 
 def test_lists_are_paged(idle: TestClient) -> None:

@@ -147,8 +147,12 @@ def test_what_no_fit_asks_for_is_removed_in_time(http: TestClient, settings: Set
     assert datasets.forget(time.time() - 60, lambda name: False) == 0
     assert datasets.forget(time.time() + 60, lambda name: name == dataset) == 0
     assert http.get(f"/v1/datasets/{dataset}").status_code == 200
+    os.utime(settings.data / "datasets" / dataset, (0, 0))
+    assert http.post("/v1/datasets", content=csv_file(), params={"quantity": "brdf"}).status_code == 200
+    assert datasets.forget(time.time() - 60, lambda name: False) == 0  # as good as new
     assert datasets.forget(time.time() + 60, lambda name: False) == 1
     assert http.get(f"/v1/datasets/{dataset}").status_code == 404
+    assert list((settings.data / "incoming").iterdir()) == []
 
 
 def test_samples_come_back_in_degrees_as_the_brdf(http: TestClient) -> None:

@@ -299,7 +299,8 @@ def test_plots_are_drawn_as_svg_and_png(http: TestClient, fit: dict[str, Any], p
 def test_a_plot_that_is_known_is_not_sent_again(http: TestClient, fit: dict[str, Any]) -> None:
     path = f"/v1/fits/{fit['id']}/plots/lobes.svg"
     tag = http.get(path).headers["etag"]
-    for known in (tag, f'"other", {tag}', tag.removeprefix("W/"), "*"):
+    assert tag.startswith("W/")
+    for known in (tag, f'"other", {tag.removeprefix("W/")}', "*"):
         answer = http.get(path, headers={"if-none-match": known})
         assert (answer.status_code, answer.content, answer.headers["etag"]) == (304, b"", tag)
     other = http.get(path, params={"scale": "log", "theta_i_deg": ["15", "45"]}, headers={"if-none-match": tag})

@@ -1,6 +1,7 @@
 """Bad input: each a 4xx problem document whose sentence names the field and says what to do."""
 
 import copy
+import io
 import json
 import math
 import pathlib
@@ -8,6 +9,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 from service_cases import csv_file, measured_diffuser
 from starlette.testclient import TestClient
@@ -170,6 +172,12 @@ def test_more_rows_than_go_inline_are_refused(http: TestClient, settings: Settin
     assert "POST /v1/datasets" in problem["detail"]
 
 
+def npz_named(channel: str) -> bytes:
+    up, out = [[0.0, 0.0, 1.0]], io.BytesIO()
+    np.savez(out, wi=up, wo=up, values=[0.1], channels=[channel])
+    return out.getvalue()
+
+
 def truncated_merl() -> bytes:
     return struct.pack("<3i", 90, 90, 180) + bytes(8 * 1000)
 
@@ -189,6 +197,7 @@ BAD_FILES = {
     "unknown format name": (csv_file(), {"format": "mrl"}, "format", "Did you mean 'merl'?"),
     "unknown quantity name": (csv_file(), {"quantity": "brfd"}, "quantity", "Did you mean 'brdf'?"),
     "unknown parameter": (csv_file(), {"quantty": "brdf"}, "quantty", "Remove it"),
+    "half of a surrogate pair": (npz_named("\ud800"), {"quantity": "brdf"}, "channels", "can be printed"),
     "not a number": (csv_file().replace(b"0.12", b"nan", 1), {"quantity": "brdf"}, None, "line"),
 }
 

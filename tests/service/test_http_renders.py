@@ -3,9 +3,7 @@
 import contextlib
 import io
 import json
-import os
 import pathlib
-import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,7 +13,6 @@ from starlette.testclient import TestClient
 
 import brdfcore as bc
 from brdfcore.render import SCENES, Scene, plan, render
-from service import renders
 from service.app import create_app
 from service.jobs.dispatcher import Dispatcher
 from service.settings import Settings
@@ -247,13 +244,3 @@ def test_every_shipped_scene_is_accepted(idle: TestClient) -> None:
         made = idle.post("/v1/renders", json={"scene": name})
         assert made.status_code == 202, made.text
         idle.delete(f"/v1/renders/{made.json()['id']}")
-
-
-def test_old_images_that_no_job_has_are_removed(tmp_path: pathlib.Path) -> None:
-    (tmp_path / "renders").mkdir()
-    for name, age in (("gone", 100), ("asked", 100), ("new", 0)):
-        path = tmp_path / "renders" / f"{name}.png"
-        path.write_bytes(b"")
-        os.utime(path, (time.time() - age, time.time() - age))
-    assert renders.forget(tmp_path, time.time() - 50, lambda name: name == "asked") == 1
-    assert sorted(path.stem for path in (tmp_path / "renders").iterdir()) == ["asked", "new"]

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from brdfcore.errors import InvalidValueError
-from service.jobs.records import Attempt, Job
+from service.jobs.records import _TABLE, Attempt, Job
 from service.jobs.retries import MOST_CRASHES, MOST_INTERRUPTED
 from service.jobs.store import JobStore
 
@@ -200,10 +200,21 @@ def test_deleting_removes_the_job_and_its_body(store: JobStore) -> None:
     job = store.submit("{}", b"secret")
     attempt = claimed(store)
     assert store.body(job.id) == b"secret"
-    assert store.delete(job.id)
-    assert not store.delete(job.id)
+    gone = store.delete(job.id)
+    assert gone is not None
+    assert (gone.id, gone.status) == (job.id, "running")
+    assert store.delete(job.id) is None
     assert (store.get(job.id), store.body(job.id)) == (None, None)
     assert not store.succeed(attempt, "{}")
+
+
+def test_a_removed_job_has_the_result_that_came_last_and_a_listed_one_has_none(store: JobStore) -> None:
+    job = store.submit("{}", b"")
+    assert store.succeed(claimed(store), '{"hash": "1"}')
+    assert [(listed.status, listed.result) for listed in store.newest(1)] == [("succeeded", None)]
+    gone = store.delete(job.id)
+    assert gone is not None
+    assert gone.result == '{"hash": "1"}'
 
 
 def test_the_list_is_paged_newest_first(store: JobStore) -> None:
@@ -267,6 +278,19 @@ def test_what_ended_long_ago_is_forgotten(store: JobStore, clock: Clock) -> None
     assert store.get(queued) is not None
     assert store.forget(clock.now - 50) == 0
     assert [store.asks_for(name) for name in ("aa", "bb", "cc")] == [False, True, True]
+
+
+def test_what_is_asked_often_does_not_stand_behind_the_body(store: JobStore) -> None:
+    assert store._reader.execute("SELECT name FROM pragma_table_info('jobs')").fetchall()[-1] == ("body",)
+
+
+def test_a_table_is_made_whole_or_not_at_all(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "jobs.sqlite3"
+    with monkeypatch.context() as broken:
+        broken.setattr("service.jobs.records._TABLE", f"{_TABLE}; CREATE TABLE fails (")
+        with pytest.raises(sqlite3.OperationalError, match="incomplete input"):
+            JobStore(path)
+    JobStore(path).close()
 
 
 def test_a_store_of_another_version_is_refused(tmp_path: pathlib.Path) -> None:

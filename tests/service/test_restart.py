@@ -49,7 +49,7 @@ def uploads_that_are_too_large_or_break_off_leave_nothing(client: Client, data: 
         assert answer.status_code == 413
         assert answer.headers["content-type"] == "application/problem+json"
     with socket.create_connection((client._http.base_url.host, client._http.base_url.port or 0)) as broken:
-        broken.sendall(b"POST /v1/datasets HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\n0123456789")
+        broken.sendall(b"POST /v1/datasets HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n0123456789")
         until(lambda: list((data / "incoming").iterdir()))
     until(lambda: not list((data / "incoming").iterdir()))
     assert list((data / "datasets").iterdir()) == []

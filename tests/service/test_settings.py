@@ -30,6 +30,7 @@ def test_arguments_win_over_the_environment_and_none_is_no_argument() -> None:
         ("BRDF_WORKERS", "0", "workers to be above 0, got 0"),
         ("BRDF_FIT_SECONDS", "nan", "fit_seconds to be above 0, got nan"),
         ("BRDF_UPLOAD_LIMIT", "1e9", "upload_limit to be of type int"),
+        ("BRDF_FIT_MEMORY", str(2**63), r"fit_memory to be below 2\^63"),
         ("BRDF_QUEUE_LIMIT", "0", "queue_limit to be above 0"),
         ("BRDF_KEEP_DAYS", "-1", "keep_days to be 0 or more"),
         ("BRDF_KEEP_DAYS", "inf", "keep_days to be 0 or more"),
