@@ -132,6 +132,25 @@ def test_shadows():
     assert not bool(render(scene, plan(scene, 1e-3, {"shadow rays": False})).pixels.reshape(-1, 3)[rows].eq(0).any())
 
 
+@pytest.mark.parametrize("turned", [False, True], ids=["level", "tilted"])
+@pytest.mark.parametrize("light", [Directional(direction=(0.3, 0.2, 1), irradiance=math.pi), Dome(radiance=1.0)])
+def test_a_rug_on_a_floor_is_not_shaded_by_it(light, turned):
+    """Shapes of one plane do not shade each other by rounding, and the first of them is seen."""
+    u, v, up = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    if turned:
+        up = (0.3 / 1.13**0.5, 0.2 / 1.13**0.5, 1 / 1.13**0.5)
+        u = (up[2] / math.hypot(up[0], up[2]), 0.0, -up[0] / math.hypot(up[0], up[2]))
+        v = (up[1] * u[2] - up[2] * u[1], up[2] * u[0] - up[0] * u[2], up[0] * u[1] - up[1] * u[0])
+    view = Camera(position=(4.1, 0.37, 2.3), look_at=(0.1, 0.03, 0), width=24, height=24, fov_deg=5)
+    rug = Rectangle(center=(0, 0, 0), edge_u=u, edge_v=v, material="lambert(kd=0.6)")
+    floor = Plane(
+        point=[0.1 * (a + b) for a, b in zip(u, v, strict=True)], normal_direction=up, material="lambert(kd=0)"
+    )
+    image = render(Scene(camera=view, objects=[rug, floor], lights=[light], samples=2)).pixels
+    facing = 1.0 if isinstance(light, Dome) else sum(a * b for a, b in zip(light.direction, up, strict=True))
+    torch.testing.assert_close(image, torch.full_like(image, 0.6 * facing))
+
+
 def test_a_white_room_is_as_bright_as_the_sky():
     """Whatever the shapes, where everything reflects all light, everything is as bright: all bounces are there."""
     objects = [

@@ -179,3 +179,12 @@ def test_inside_and_distances():
     inside = torch.zeros(1, 3, dtype=torch.float64)
     up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64)
     assert [float(x) for x in light.met(inside, up, up)] == pytest.approx([2, 1 / (4 * torch.pi)])
+
+
+@pytest.mark.parametrize("length", [1e-6, 1.0, 1e20])
+def test_rectangles_of_any_size_face_one_side(length):
+    """As large as numbers may be, and as small: the normal is of unit length."""
+    wall = Rectangle(material="lambert", center=(0, 0, 0), edge_u=(length, 0, 0), edge_v=(0, length, 0))
+    origin = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64)
+    assert wall.normal(origin).tolist() == origin.tolist()
+    assert wall.hit(origin, -origin).tolist() == [1.0]
