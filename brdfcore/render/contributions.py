@@ -121,17 +121,22 @@ def lost_albedo(whole: AnySurface, less: AnySurface, farthest: float, tolerance:
     return _largest((_albedos(whole, farthest, tolerance) - rest).abs()) + tolerance
 
 
-def lost_highlight(scene: Scene, whole: AnySurface, less: AnySurface, where: Vertices | None, enough: float) -> float:
-    """The largest loss [radiance] under the lights without extent at visible points, or at least `enough`."""
+def lost_highlight(
+    scene: Scene, whole: AnySurface, less: AnySurface, where: Vertices | None, enough: float
+) -> tuple[float, bool]:
+    """The largest loss [radiance] under the lights without extent at visible points.
+
+    The second is whether it is that of a few points only, where it is more than `enough` already.
+    """
     if where is None:
-        return 0.0
+        return 0.0, False
     lights = [light for light in scene.lights if isinstance(light, DeltaLight)]
     spread = torch.linspace(0, len(where) - 1, min(FIRST, len(where))).long()
     largest = _highlight(lights, whole, less, where.take(spread))
     if largest > enough or len(where) <= FIRST:
-        return largest
+        return largest, len(where) > FIRST
     rows = torch.arange(len(where)).split(TILE)
-    return max(_highlight(lights, whole, less, where.take(part)) for part in rows)
+    return max(_highlight(lights, whole, less, where.take(part)) for part in rows), False
 
 
 def _highlight(lights: Sequence[DeltaLight], whole: AnySurface, less: AnySurface, where: Vertices) -> float:

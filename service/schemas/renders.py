@@ -47,6 +47,9 @@ class EffectView(View):
         description="bound on what leaving it out changes in a pixel [radiance]; null where nothing bounds it"
     )
     forced: bool
+    partial: bool = Field(
+        False, description="whether error is a part of the bound only, which was too much already to leave it out"
+    )
 
 
 class PlanView(View):
