@@ -45,12 +45,17 @@ def plan(
     Raises InvalidValueError for a tolerance below 0, where nothing is left to sample a light with, and for an albedo
     look-up where it would be wrong; UnknownNameError for an effect that the scene does not have.
     """
-    if not (math.isfinite(tolerance) and tolerance >= 0):
+    if not (_checks.finite(tolerance) and tolerance >= 0):
         raise InvalidValueError(
-            f"Expected tolerance to be a finite number from 0, got {tolerance:g}. It is a radiance.", field="tolerance"
+            f"Expected tolerance to be a finite number from 0, got {tolerance!r}. It is a radiance.", field="tolerance"
         )
     _checks.whole("bounces", bounces, 0, 1024)
     forced = dict(force or {})
+    for name, value in forced.items():
+        if not isinstance(value, bool):
+            raise InvalidValueError(
+                f"Expected force of {name!r} to be True or False, got {value!r}. Write one of them.", field="force"
+            )
     lone = len(scene.objects) == 1
     materials = list({id(shape.material): shape.material for shape in scene.objects}.values())
     place = {id(material): number for number, material in enumerate(materials)}

@@ -130,6 +130,10 @@ def test_force_and_its_errors():
             plan(made, force={"albedo look-up": True} | force)
     with pytest.raises(InvalidValueError, match=r"^Expected tolerance to be a finite number from 0, got -1\."):
         plan(scene, -1.0)
+    with pytest.raises(InvalidValueError, match=r"^Expected tolerance to be a finite number from 0, got 'low'\."):
+        plan(scene, "low")
+    with pytest.raises(InvalidValueError, match=r"^Expected force of 'shadow rays' to be True or False, got 'off'\."):
+        plan(scene, force={"shadow rays": "off"})
 
 
 def test_the_table_says_it_all():

@@ -56,6 +56,9 @@ def test_a_file_is_read_and_a_wrong_one_told(tmp_path):
     (tmp_path / "bad.json").write_text("{")
     with pytest.raises(InvalidValueError, match=r"^Expected bad.json to be JSON, got: .*Correct it there\.$"):
         Scene.load(tmp_path / "bad.json")
+    (tmp_path / "deep.json").write_text("[" * 10**5)
+    with pytest.raises(InvalidValueError, match=r"^Expected deep.json to be JSON, got: maximum recursion depth"):
+        Scene.load(tmp_path / "deep.json")
     with pytest.raises(FormatError, match=r"^Expected scene to be a readable file, got 'none.json' \(No such file"):
         Scene.load(tmp_path / "none.json")
     with pytest.raises(BrdfError, match=r"^Expected a scene to be a known name, got 'furnance'"):
@@ -163,6 +166,8 @@ def test_a_scene_of_wrong_parts():
         Scene(camera=camera(), objects=[Dome(radiance=1)], lights=[Dome(radiance=1)])
     with pytest.raises(InvalidValueError, match=r"^Expected lights to be a sequence of Lights, got"):
         Scene(camera=camera(), objects=[ball], lights=[ball])
+    with pytest.raises(InvalidValueError, match=r"^Expected camera to be a Camera, got 3\."):
+        Scene(camera=3, objects=[ball], lights=[Dome(radiance=1)])
     with pytest.raises(InvalidValueError, match=r"^Expected material to be a Material, got int"):
         Sphere(material=3, **BALL)
     with pytest.raises(InvalidValueError, match=r"^Expected camera.position to be outside of objects\[0\]"):
