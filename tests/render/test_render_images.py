@@ -182,6 +182,15 @@ def test_noise_is_what_it_says_and_stops():
     assert torch.equal(image.pixels, render(quick).pixels)
 
 
+def test_progress_is_told_tile_after_tile(monkeypatch):
+    """The first pass of a large image may take long."""
+    monkeypatch.setattr("brdfcore.render.progressive.TILE", 512)
+    scene = lone_sphere("lambert(kd=0.5)", [SphereLight(center=(3, 3, 3), radius=1, radiance=5.0)], samples=32)
+    shares: list[float] = []
+    render(scene, progress=shares.append)
+    assert shares == [(k + 1) / 10 for k in range(10)]
+
+
 def test_a_raster_of_rays_is_their_mean():
     lights = [Directional(direction=(1, 1, 1), irradiance=1.0)]
     fine = Scene(camera=camera(8), objects=[Sphere(material="lambert", **BALL)], lights=lights)
