@@ -27,6 +27,7 @@ class Effect:
     error: float  # bound on what leaving it out changes in a pixel [radiance]; inf where nothing bounds it
     forced: bool = False
     partial: bool = False  # whether `error` is a part of the bound only, of an effect that it keeps on
+    estimated: bool = False  # whether `error` is no bound: that of a mean radiance, or of a table's sampled albedo
 
     @property
     def bounce(self) -> bool:
@@ -95,14 +96,15 @@ class Plan:
         rows = [("effect", "", "cost", "error without", "reason")]
         for effect in self._told():
             error = "unbounded" if math.isinf(effect.error) else f"{effect.error:.1e}" if effect.error else "0"
-            error = f"> {error}" if effect.partial else error
+            error = ("> " if effect.partial else "~ " if effect.estimated and effect.error else "") + error
             word = ("on" if effect.on else "off") + (" (forced)" if effect.forced else "")
             rows.append((effect.name, word, f"{effect.cost:.1e}", error, effect.reason))
         sizes = [max(len(row[k]) for row in rows) for k in range(4)]
         lines = ["  ".join([*(cell.ljust(n) for cell, n in zip(row[:4], sizes, strict=True)), row[4]]) for row in rows]
         met = "within" if self.met else "NOT within"
+        word = "about" if any(e.estimated and e.error and not e.on for e in self.effects) else "at most"
         bound = "unbounded" if math.isinf(self.error) else f"{self.error:.1e}"
-        return "\n".join([*lines, f"left out: at most {bound}, {met} the tolerance {self.tolerance:g}"])
+        return "\n".join([*lines, f"left out: {word} {bound}, {met} the tolerance {self.tolerance:g}"])
 
 
 def _finite(x: float) -> float | None:

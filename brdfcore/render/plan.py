@@ -142,7 +142,8 @@ def _bounces(
         on = forced.get(name, tail > tolerance / 2 or number < max(wanted, default=0))
         if number > bounces:
             on, reason = False, f"beyond the limit of {bounces} bounces"
-        effects.append(Effect(name, on, reason, 0.0, tail, name in forced))
+        estimated = math.isfinite(tail) and not lone and (light.in_mean or measured)
+        effects.append(Effect(name, on, reason, 0.0, tail, name in forced, estimated=estimated))
         if not on:
             break
     return effects

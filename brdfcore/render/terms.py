@@ -75,7 +75,8 @@ def decide(
         if isinstance(surface, Measured):
             name = f"{owner}: {LABEL}"
             bound, partial = bounded(name, surface, surface.without(LABEL))
-            rows.append(_Row(Effect(name, True, ESTIMATED, 0.0, bound, partial=partial), number, LABEL))
+            effect = Effect(name, True, ESTIMATED, 0.0, bound, partial=partial, estimated=bool(light.even or depth))
+            rows.append(_Row(effect, number, LABEL))
             continue
         values = surface.values(torch.zeros((), dtype=torch.float64))
         for term in surface.form.terms:

@@ -50,6 +50,9 @@ class EffectView(View):
     partial: bool = Field(
         False, description="whether error is a part of the bound only, which was too much already to leave it out"
     )
+    estimated: bool = Field(
+        False, description="whether error is no bound: that of a mean radiance, or of a table's sampled albedo"
+    )
 
 
 class PlanView(View):

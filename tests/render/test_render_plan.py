@@ -153,6 +153,17 @@ def test_the_table_says_it_all():
     assert chosen.cost > plan(endless, force={"interreflection 1": False}).cost > 0
 
 
+def test_what_is_no_bound_is_told_as_an_estimate():
+    """Caustics of lights without extent are as bright as they like; diffuse surfaces have none."""
+    for material, word, flag in (("ggx(ks=0.5)", "about", True), ("lambert(kd=0.5)", "at most", False)):
+        objects = [Sphere(material=material, **BALL), Plane(point=(0, 0, -1), material="lambert(kd=0.3)")]
+        chosen = plan(Scene(camera=camera(), objects=objects, lights=[SUN]), 1e-2)
+        last = [effect for effect in chosen.effects if effect.bounce][-1]
+        assert (last.on, last.estimated) == (False, flag)
+        assert str(chosen).splitlines()[-1].startswith(f"left out: {word} {chosen.error:.1e}")
+        assert ("~ " in str(chosen)) == flag
+
+
 def test_a_bounce_that_is_forced_brings_those_before_it():
     objects = [Sphere(material="lambert(kd=0.5)", **BALL), Plane(point=(0, 0, -1), material="lambert(kd=0.5)")]
     scene = Scene(camera=camera(), objects=objects, lights=[SKY])
