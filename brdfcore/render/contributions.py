@@ -85,6 +85,16 @@ def _solid_angle(light: AreaLight, scene: Scene) -> float:
     return math.inf
 
 
+def near(scene: Scene) -> bool:
+    """Whether an object is so near to a rectangle that shines that points drawn on it are mostly the wrong ones."""
+    return any(
+        math.hypot(*light.edge_u) * math.hypot(*light.edge_v)
+        > math.pi * max(min(shape.distance(light.center) for shape in scene.objects), 0.0) ** 2
+        for light in scene.lights
+        if isinstance(light, RectangleLight)
+    )
+
+
 def irradiance(scene: Scene) -> float:
     """The largest irradiance of the lights without extent on any object, together."""
     zero, total = torch.zeros((), dtype=torch.float64), 0.0

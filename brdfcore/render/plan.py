@@ -155,6 +155,7 @@ def _sampling(scene: Scene, surfaces: list[AnySurface], lone: bool, forced: Mapp
     dome = any(isinstance(a, Dome) for a in scene.lights)
     extended = any(isinstance(a, AreaLight) and not isinstance(a, Dome) for a in scene.lights)
     lobes = any(math.isinf(surface.peak) for surface in surfaces)
+    near = contributions.near(scene)
     measured = any(isinstance(surface, Measured) for surface in surfaces)
     right = forced.get(WEIGHTS, True)
     look_up = forced.get(LOOK_UP, dome and lone and right and not measured)
@@ -187,10 +188,12 @@ def _sampling(scene: Scene, surfaces: list[AnySurface], lone: bool, forced: Mapp
         ),
         (
             BRDF_SAMPLING,
-            sampled_dome or (extended and lobes),
+            sampled_dome or near or (extended and lobes),
             "even light comes from everywhere"
             if sampled_dome
-            else ("lobes may be narrower than lights" if extended and lobes else "nothing that needs it"),
+            else "lobes may be narrower than lights"
+            if extended and lobes
+            else ("a light is near and large" if near else "nothing that needs it"),
             0.0,
         ),
         (WEIGHTS, True, "f cos theta_i / pdf; without it, samples count with the reflectance", math.inf),

@@ -117,6 +117,16 @@ def test_diffuse_floor_under_a_light(light, way):
     assert error < 0.02
 
 
+def test_a_large_light_near_by_is_sampled_by_the_material_too():
+    """An endless ceiling is an even sky; points drawn on it lie mostly at its far ends."""
+    lamp = RectangleLight(center=(0, 0, 1), edge_u=(0, 100, 0), edge_v=(100, 0, 0), radiance=1.0)
+    view = Camera(position=(3, 0, 0.8), look_at=(0, 0, 0), fov_deg=10, width=4, height=4)
+    scene = Scene(camera=view, objects=[Plane(material="lambert(kd=1)")], lights=[lamp], samples=256)
+    image = render(scene)
+    assert image.plan["brdf sampling"].reason == "a light is near and large"
+    assert float((image.pixels - 1).abs().max()) < 0.05
+
+
 def test_shadows():
     """A sphere between a light and the floor: dark where it blocks, and nothing else is changed."""
     view = Camera(position=(3, 0, 1.5), look_at=(0, 0, 0), fov_deg=20, width=16, height=16)
