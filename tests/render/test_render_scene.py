@@ -193,3 +193,19 @@ def test_rectangles_of_any_size_face_one_side(length):
     origin = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64)
     assert wall.normal(origin).tolist() == origin.tolist()
     assert wall.hit(origin, -origin).tolist() == [1.0]
+
+
+def test_the_materials_x_axis_runs_along_the_tangent():
+    """Up a sphere's meridians, along a plane's x and a rectangle's first edge, unless a tangent is given; y follows."""
+    ball = Sphere(material="lambert", center=(0, 0, 0), radius=1)
+    turned = Sphere(material="lambert", center=(0, 0, 0), radius=1, tangent=(3, 2, 0))
+    wall = Rectangle(material="lambert", center=(0, 0, 0), edge_u=(0, 2, 0), edge_v=(0, 0, 2))
+    for shape, point, x, y in (
+        (ball, [1, 0, 0], [0, 0, 1], [0, -1, 0]),
+        (turned, [1, 0, 0], [0, 1, 0], [0, 0, 1]),
+        (wall, [0, 0, 0], [0, 1, 0], [0, 0, 1]),
+        (Plane(material="lambert"), [0, 0, 0], [1, 0, 0], [0, 1, 0]),
+    ):
+        at = torch.tensor([point], dtype=torch.float64)
+        axes = shape.frame(shape.normal(at))
+        assert [axis[0].tolist() for axis in axes[:2]] == [x, y]
