@@ -16,7 +16,7 @@ Colour = float | Sequence[float] | Tensor  # one number, or red, green and blue
 
 def vector(name: str, value: object) -> Vector:
     """Three finite numbers, or an error."""
-    if isinstance(value, list | tuple) and len(value) == 3 and all(map(_finite, value)):
+    if isinstance(value, list | tuple) and len(value) == 3 and all(map(finite, value)):
         return (float(value[0]), float(value[1]), float(value[2]))
     raise InvalidValueError(
         f"Expected {name} to be three finite numbers, none beyond 1e30, got {value!r}. Write it as [x, y, z].",
@@ -37,7 +37,7 @@ def direction(name: str, value: object) -> Vector:
 
 def positive(name: str, value: object) -> float:
     """A finite number above 0, or an error."""
-    if _finite(value) and value > 0:  # type: ignore[operator]
+    if finite(value) and value > 0:  # type: ignore[operator]
         return float(value)  # type: ignore[arg-type]
     raise InvalidValueError(
         f"Expected {name} to be a finite number above 0 and up to 1e30, got {value!r}. Give it a size.", field=name
@@ -74,7 +74,7 @@ def colour(name: str, value: object) -> Colour:
         numbers = value.detach().reshape(-1).tolist() if value.shape in ((), (1,), (3,)) else []
     else:
         numbers = list(value) if isinstance(value, list | tuple) else [value]
-    if len(numbers) in (1, 3) and all(_finite(x) and x >= 0 for x in numbers):
+    if len(numbers) in (1, 3) and all(finite(x) and x >= 0 for x in numbers):
         return value  # type: ignore[return-value]
     raise InvalidValueError(
         f"Expected {name} to be one number or three, finite, not negative and up to 1e30, got {value!r}. "
@@ -106,5 +106,6 @@ def located(error: BrdfError, where: str) -> BrdfError:
     return type(error)(message, field=field)
 
 
-def _finite(x: object) -> bool:
+def finite(x: object) -> bool:
+    """Whether it is a number, and none that is too large."""
     return isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST

@@ -85,6 +85,16 @@ def _solid_angle(light: AreaLight, scene: Scene) -> float:
     return math.inf
 
 
+def near(scene: Scene) -> bool:
+    """Whether an object is so near to a rectangle that shines that points drawn on it are mostly the wrong ones."""
+    return any(
+        math.hypot(*light.edge_u) * math.hypot(*light.edge_v)
+        > math.pi * max(min(shape.distance(light.center) for shape in scene.objects), 0.0) ** 2
+        for light in scene.lights
+        if isinstance(light, RectangleLight)
+    )
+
+
 def irradiance(scene: Scene) -> float:
     """The largest irradiance of the lights without extent on any object, together."""
     zero, total = torch.zeros((), dtype=torch.float64), 0.0
@@ -121,17 +131,22 @@ def lost_albedo(whole: AnySurface, less: AnySurface, farthest: float, tolerance:
     return _largest((_albedos(whole, farthest, tolerance) - rest).abs()) + tolerance
 
 
-def lost_highlight(scene: Scene, whole: AnySurface, less: AnySurface, where: Vertices | None, enough: float) -> float:
-    """The largest loss [radiance] under the lights without extent at visible points, or at least `enough`."""
+def lost_highlight(
+    scene: Scene, whole: AnySurface, less: AnySurface, where: Vertices | None, enough: float
+) -> tuple[float, bool]:
+    """The largest loss [radiance] under the lights without extent at visible points.
+
+    The second is whether it is that of a few points only, where it is more than `enough` already.
+    """
     if where is None:
-        return 0.0
+        return 0.0, False
     lights = [light for light in scene.lights if isinstance(light, DeltaLight)]
     spread = torch.linspace(0, len(where) - 1, min(FIRST, len(where))).long()
     largest = _highlight(lights, whole, less, where.take(spread))
     if largest > enough or len(where) <= FIRST:
-        return largest
+        return largest, len(where) > FIRST
     rows = torch.arange(len(where)).split(TILE)
-    return max(_highlight(lights, whole, less, where.take(part)) for part in rows)
+    return max(_highlight(lights, whole, less, where.take(part)) for part in rows), False
 
 
 def _highlight(lights: Sequence[DeltaLight], whole: AnySurface, less: AnySurface, where: Vertices) -> float:

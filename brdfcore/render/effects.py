@@ -26,6 +26,13 @@ class Effect:
     cost: float  # term evaluations and ray tests that it adds, or would add, to the image
     error: float  # bound on what leaving it out changes in a pixel [radiance]; inf where nothing bounds it
     forced: bool = False
+    partial: bool = False  # whether `error` is a part of the bound only, of an effect that it keeps on
+    estimated: bool = False  # whether `error` is no bound: that of a mean radiance, or of a table's sampled albedo
+
+    @property
+    def bounce(self) -> bool:
+        """Whether it is an interreflection."""
+        return self.name.startswith(INTERREFLECTION) and ": " not in self.name
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +59,8 @@ class Plan:
     def error(self) -> float:
         """The sum of the bounds of what is left out [radiance]; interreflections count from the first left out."""
         off = [effect for effect in self.effects if not effect.on]
-        bounces = [effect.error for effect in off if effect.name.startswith(INTERREFLECTION)]
-        return sum(effect.error for effect in off if not effect.name.startswith(INTERREFLECTION)) + max(
-            bounces, default=0.0
-        )
+        bounces = [effect.error for effect in off if effect.bounce]
+        return sum(effect.error for effect in off if not effect.bounce) + max(bounces, default=0.0)
 
     @property
     def met(self) -> bool:
@@ -79,7 +84,7 @@ class Plan:
 
     def _told(self) -> list[Effect]:
         """The rows of the table: interreflections that are on are one."""
-        on = [e for e in self.effects if e.on and e.name.startswith(INTERREFLECTION)]
+        on = [effect for effect in self.effects if effect.on and effect.bounce]
         if len(on) < 2:
             return list(self.effects)
         name = f"{on[0].name} to {on[-1].name.removeprefix(INTERREFLECTION).strip()}"
@@ -91,13 +96,15 @@ class Plan:
         rows = [("effect", "", "cost", "error without", "reason")]
         for effect in self._told():
             error = "unbounded" if math.isinf(effect.error) else f"{effect.error:.1e}" if effect.error else "0"
+            error = ("> " if effect.partial else "~ " if effect.estimated and effect.error else "") + error
             word = ("on" if effect.on else "off") + (" (forced)" if effect.forced else "")
             rows.append((effect.name, word, f"{effect.cost:.1e}", error, effect.reason))
         sizes = [max(len(row[k]) for row in rows) for k in range(4)]
         lines = ["  ".join([*(cell.ljust(n) for cell, n in zip(row[:4], sizes, strict=True)), row[4]]) for row in rows]
         met = "within" if self.met else "NOT within"
+        word = "about" if any(e.estimated and e.error and not e.on for e in self.effects) else "at most"
         bound = "unbounded" if math.isinf(self.error) else f"{self.error:.1e}"
-        return "\n".join([*lines, f"left out: at most {bound}, {met} the tolerance {self.tolerance:g}"])
+        return "\n".join([*lines, f"left out: {word} {bound}, {met} the tolerance {self.tolerance:g}"])
 
 
 def _finite(x: float) -> float | None:

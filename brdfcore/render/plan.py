@@ -39,17 +39,23 @@ def plan(
 ) -> Plan:
     """The plan of a scene, whose image differs from that of everything by at most the tolerance [radiance].
 
-    force    effect's name -> on or off, whatever the bounds say; "interreflection 2" off ends paths after one bounce
+    force    effect's name -> on or off, whatever the bounds say; "interreflection 2" off ends paths after one bounce,
+             on brings the first too
     bounces  the most interreflections that are thought of, up to 1024
-    Raises InvalidValueError for a tolerance below 0 and where nothing is left to sample a light with, and
-    UnknownNameError for an effect that the scene does not have.
+    Raises InvalidValueError for a tolerance below 0, where nothing is left to sample a light with, and for an albedo
+    look-up where it would be wrong; UnknownNameError for an effect that the scene does not have.
     """
-    if not (math.isfinite(tolerance) and tolerance >= 0):
+    if not (_checks.finite(tolerance) and tolerance >= 0):
         raise InvalidValueError(
-            f"Expected tolerance to be a finite number from 0, got {tolerance:g}. It is a radiance.", field="tolerance"
+            f"Expected tolerance to be a finite number from 0, got {tolerance!r}. It is a radiance.", field="tolerance"
         )
     _checks.whole("bounces", bounces, 0, 1024)
     forced = dict(force or {})
+    for name, value in forced.items():
+        if not isinstance(value, bool):
+            raise InvalidValueError(
+                f"Expected force of {name!r} to be True or False, got {value!r}. Write one of them.", field="force"
+            )
     lone = len(scene.objects) == 1
     materials = list({id(shape.material): shape.material for shape in scene.objects}.values())
     place = {id(material): number for number, material in enumerate(materials)}
@@ -70,6 +76,12 @@ def plan(
         surfaces = [replace(analytic, uniform_weights=True) for analytic in _analytic(surfaces, WEIGHTS, "on")]
     if LOOK_UP in on:
         _analytic(surfaces, LOOK_UP, "off")
+        if not lone or WEIGHTS not in on:
+            raise InvalidValueError(
+                f"Expected {LOOK_UP} to be off where there are several objects or uniform weights, got it forced on. "
+                "An albedo is what one convex object shows.",
+                field="force",
+            )
     sampled = [a for a in scene.lights if isinstance(a, AreaLight) and not (isinstance(a, Dome) and LOOK_UP in on)]
     if sampled and not {LIGHT_SAMPLING, BRDF_SAMPLING} & on:
         raise InvalidValueError(
@@ -114,6 +126,7 @@ def _bounces(
 ) -> list[Effect]:
     """The interreflections: those that are on, and the first that is not, which stands for all beyond it."""
     effects: list[Effect] = []
+    wanted = [number for number in range(1, bounces + 1) if forced.get(f"{INTERREFLECTION} {number}")]
     measured = any(isinstance(shape.material, Tabulated) for shape in scene.objects)
     for number in range(1, bounces + 2):
         name = f"{INTERREFLECTION} {number}"
@@ -126,10 +139,11 @@ def _bounces(
                 reason += "; in the mean, caustics have no bound"
         else:
             tail, reason = math.inf, f"largest albedo {light.albedo:.3g}: the series does not fall"
-        on = forced.get(name, tail > tolerance / 2)
+        on = forced.get(name, tail > tolerance / 2 or number < max(wanted, default=0))
         if number > bounces:
             on, reason = False, f"beyond the limit of {bounces} bounces"
-        effects.append(Effect(name, on, reason, 0.0, tail, name in forced))
+        estimated = math.isfinite(tail) and not lone and (light.in_mean or measured)
+        effects.append(Effect(name, on, reason, 0.0, tail, name in forced, estimated=estimated))
         if not on:
             break
     return effects
@@ -141,6 +155,7 @@ def _sampling(scene: Scene, surfaces: list[AnySurface], lone: bool, forced: Mapp
     dome = any(isinstance(a, Dome) for a in scene.lights)
     extended = any(isinstance(a, AreaLight) and not isinstance(a, Dome) for a in scene.lights)
     lobes = any(math.isinf(surface.peak) for surface in surfaces)
+    near = contributions.near(scene)
     measured = any(isinstance(surface, Measured) for surface in surfaces)
     right = forced.get(WEIGHTS, True)
     look_up = forced.get(LOOK_UP, dome and lone and right and not measured)
@@ -173,10 +188,12 @@ def _sampling(scene: Scene, surfaces: list[AnySurface], lone: bool, forced: Mapp
         ),
         (
             BRDF_SAMPLING,
-            sampled_dome or (extended and lobes),
+            sampled_dome or near or (extended and lobes),
             "even light comes from everywhere"
             if sampled_dome
-            else ("lobes may be narrower than lights" if extended and lobes else "nothing that needs it"),
+            else "lobes may be narrower than lights"
+            if extended and lobes
+            else ("a light is near and large" if near else "nothing that needs it"),
             0.0,
         ),
         (WEIGHTS, True, "f cos theta_i / pdf; without it, samples count with the reflectance", math.inf),
@@ -209,7 +226,7 @@ def _costed(effects: list[Effect], scene: Scene, surfaces: list[AnySurface], dep
         replace(
             effect,
             cost=float(
-                costs.get(effect.name, bounce if effect.name.startswith(INTERREFLECTION) else 0)
+                costs.get(effect.name, bounce if effect.bounce else 0)
                 if ": " not in effect.name
                 else evaluations / len(surfaces)
             ),

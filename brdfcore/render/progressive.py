@@ -71,11 +71,13 @@ def _passes(
     while taken < wanted:
         most = max(PASS, TILE // len(rays))
         count = min(max(PASS, taken), most, wanted - taken)  # doubled, as long as all rays fit a tile
-        parts = list(_tiles(integrator, rays, count, generator))
+        parts, tiles = [], math.ceil(len(rays) / max(1, TILE // count))
+        for part in _tiles(integrator, rays, count, generator):
+            parts.append(part)
+            progress((taken + count * len(parts) / tiles) / wanted)
         total = total + torch.cat([part[0] for part in parts])
         squares = squares + torch.cat([part[1] for part in parts])
         taken += count
-        progress(taken / wanted)
         with torch.no_grad():
             mean = total / taken
             variance = (

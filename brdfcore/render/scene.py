@@ -54,6 +54,10 @@ class Scene:
     exposure: float = 1.0
 
     def __post_init__(self) -> None:
+        if not isinstance(self.camera, Camera):
+            raise InvalidValueError(
+                f"Expected camera to be a Camera, got {self.camera!r}. Make it by its class.", field="camera"
+            )
         for name, kind in (("objects", Shape), ("lights", Light)):
             parts = getattr(self, name)
             if not isinstance(parts, list | tuple) or not all(isinstance(part, kind) for part in parts):
@@ -139,7 +143,7 @@ class Scene:
                 f"Expected scene to be a readable file, got {file.name!r} ({error.strerror}). Check the path.",
                 field="scene",
             ) from error
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise InvalidValueError(
                 f"Expected {file.name} to be JSON, got: {error}. Correct it there.", field="scene"
             ) from None

@@ -1,8 +1,9 @@
 """The shapes of a scene: spheres, planes and rectangles, each with a material and its tangent frame.
 
 Every shape is convex and is seen from its outside, to which its normal points; its back is black. So a ray that leaves
-a shape's outside never meets the same shape again, and no distance has to be held off against rounding. `hit` returns
-distances along unit directions, inf where there is none. The material's x axis is the part of `tangent` that lies in
+a shape's outside never meets the same shape again, and no distance has to be held off against rounding; a plane is not
+met from where it is, as by rays that leave a rug on a floor. `hit` returns distances along unit directions, inf where
+there is none. The material's x axis is the part of `tangent` that lies in
 the surface; where nothing of it does, at the poles of a sphere, it is any direction.
 """
 
@@ -18,6 +19,8 @@ from ..models.material import Material, check_material, material
 from ..tabulated import Tabulated
 from . import _checks
 from ._checks import Vector
+
+IN_PLANE = 1e-12  # of the distance to a plane's point: a height that is rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -203,11 +206,11 @@ def sphere_distance(origin: Tensor, direction: Tensor, center: Vector, radius: f
 
 def plane_distance(origin: Tensor, direction: Tensor, point: Vector, normal: Vector) -> Tensor:
     """The distance to a plane, (...)."""
-    n = origin.new_tensor(normal)
-    slope = inner(direction, n)
-    height = inner(origin.new_tensor(point) - origin, n)
+    n, to_point = origin.new_tensor(normal), origin.new_tensor(point) - origin
+    slope, height = inner(direction, n), inner(to_point, n)
     t = height / torch.where(slope == 0, 1.0, slope)
-    return torch.where((slope != 0) & (t > 0), t, torch.inf)
+    away = height.square() > IN_PLANE**2 * inner(to_point, to_point)
+    return torch.where((slope != 0) & (t > 0) & away, t, torch.inf)
 
 
 def rectangle_distance(origin: Tensor, direction: Tensor, center: Vector, u: Vector, v: Vector) -> Tensor:
@@ -227,7 +230,8 @@ def inner(a: Tensor, b: Tensor) -> Tensor:
 
 
 def cross(u: Vector, v: Vector) -> Vector:
-    """The unit vector along u x v."""
+    """The unit vector along u x v, of vectors of any length."""
+    u, v = _checks.direction("edge_u", u), _checks.direction("edge_v", v)
     return _checks.direction(
         "edge_u x edge_v", [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
     )

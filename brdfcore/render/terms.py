@@ -58,37 +58,52 @@ def decide(
     budget: float,
     forced: Mapping[str, bool],
 ) -> tuple[list[Effect], list[AnySurface]]:
-    """The terms and their options, each with its bound, and the surfaces without those that are left out."""
+    """The terms and their options, each with its bound, and the surfaces without those that are left out.
+
+    Of what stays on, the bound is found as far as it takes to know that; of what is forced off, all of it.
+    """
     visible = contributions.seen(scene, surface_of, len(surfaces))
+    names = _names(scene)
     rows: list[_Row] = []
     for number, surface in enumerate(surfaces):
-        owner = _name(scene, surface_of.index(number))
+        owner = names[surface_of.index(number)]
+
+        def bounded(name: str, whole: AnySurface, less: AnySurface, number: int = number) -> tuple[float, bool]:
+            enough = math.inf if forced.get(name) is False else budget
+            return _bound(scene, whole, less, visible[number], light, depth, budget, enough)
+
         if isinstance(surface, Measured):
-            bound = _bound(scene, surface, surface.without(LABEL), visible[number], light, depth, budget)
-            rows.append(_Row(Effect(f"{owner}: {LABEL}", True, ESTIMATED, 0.0, bound), number, LABEL))
+            name = f"{owner}: {LABEL}"
+            bound, partial = bounded(name, surface, surface.without(LABEL))
+            effect = Effect(name, True, ESTIMATED, 0.0, bound, partial=partial, estimated=bool(light.even or depth))
+            rows.append(_Row(effect, number, LABEL))
             continue
         values = surface.values(torch.zeros((), dtype=torch.float64))
         for term in surface.form.terms:
             own = surface.form.of_term(term, values)
             others = frozenset(t.label for t in surface.form.terms if t is not term)
             alone, nothing = replace(surface, dropped=others), replace(surface, dropped=others | {term.label})
-            name, bound, reason = f"{owner}: {term.label}", 0.0, "its reflectance is 0"
+            name, bound, partial, reason = f"{owner}: {term.label}", 0.0, False, "its reflectance is 0"
             if not _is_zero(term.model, own):
-                bound, reason = _bound(scene, alone, nothing, visible[number], light, depth, budget), "its largest part"
-            rows.append(_Row(Effect(name, True, reason, 0.0, bound), number, term.label))
+                (bound, partial), reason = bounded(name, alone, nothing), "its largest part"
+            rows.append(_Row(Effect(name, True, reason, 0.0, bound, partial=partial), number, term.label))
             for word in replaceable(term.model):
                 swapped = _swapped(term.model, own, word)
                 if swapped is None:
                     continue
                 needless, why = swapped
-                if bound == 0 or needless:
-                    found, mixed = 0.0, False
-                elif mixed := needless is None:
-                    found = bound
-                else:
+                option = f"{name} {OPTION_NAMES[word]}"
+                found, unfinished, mixed = 0.0, False, False
+                if bound and not needless:
+                    mixed = needless is None
                     simpler = replace(alone, simpler={term.label: frozenset({word})})
-                    found = _bound(scene, alone, simpler, visible[number], light, depth, budget)
-                effect = Effect(f"{name} {OPTION_NAMES[word]}", True, why, 0.0, found)
+                    if not mixed:
+                        found, unfinished = bounded(option, alone, simpler)
+                    elif forced.get(option) is False:  # no more than all of the one and all of the other
+                        found = bounded(option, alone, nothing)[0] + bounded(option, simpler, nothing)[0]
+                    else:
+                        found, unfinished = bound, True
+                effect = Effect(option, True, why, 0.0, found, partial=unfinished)
                 rows.append(_Row(effect, number, term.label, word, mixed))
     return _chosen(rows, surfaces, budget, forced)
 
@@ -144,9 +159,13 @@ def _bound(
     light: Lighting,
     depth: int,
     budget: float,
-) -> float:
-    """What the image loses at most where `less` takes the place of `whole` [radiance]."""
-    bound = contributions.lost_highlight(scene, whole, less, visible.vertices, budget)
+    enough: float,
+) -> tuple[float, bool]:
+    """What the image loses at most where `less` takes the place of `whole` [radiance].
+
+    The second is whether this is a part of it only, which is more than `enough` already.
+    """
+    bound, partial = contributions.lost_highlight(scene, whole, less, visible.vertices, enough)
     peak = whole.peak
     if light.even:
         fine = min(max(1e-2 * budget / light.even, 1e-9), 1e-3)
@@ -155,21 +174,26 @@ def _bound(
             if light.reflected(max(lost - 2 * tolerance, 0.0), peak) > budget:
                 break
         bound += light.reflected(lost, peak)
-    if depth and bound <= budget:
+    if depth and bound > enough:
+        partial = True
+    elif depth:
         lost = contributions.lost_albedo(whole, less, contributions.GRAZING, 1e-6)
         if light.albedo >= 1 or light.in_mean or (light.irradiance and math.isinf(peak)):
-            return math.inf
+            return math.inf, False
         indirect = light.direct / (1 - light.albedo)
         again = light.reflected(lost, peak) + (peak * light.irradiance if light.irradiance else 0.0) + lost * indirect
         bound += lost * indirect + again * light.albedo / (1 - light.albedo)
-    return bound
+    return bound, partial
 
 
-def _name(scene: Scene, index: int) -> str:
-    """The name of an object, or its kind and number."""
-    shape = scene.objects[index]
-    lone = sum(other.name == shape.name for other in scene.objects) == 1
-    return shape.name if shape.name and lone else f"{shape.name or type(shape).__name__.lower()} {index + 1}"
+def _names(scene: Scene) -> list[str]:
+    """The objects' names, each another: with its number where it has none, or one that does not tell it apart."""
+    given = [shape.name or type(shape).__name__.lower() for shape in scene.objects]
+    numbered = [f"{name} {number + 1}" for number, name in enumerate(given)]
+    return [
+        shape.name if shape.name and given.count(name) == 1 and name not in numbered else other
+        for shape, name, other in zip(scene.objects, given, numbered, strict=True)
+    ]
 
 
 def _is_zero(model: Model, own: Values) -> bool:

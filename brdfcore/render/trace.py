@@ -9,6 +9,7 @@ from torch import Tensor
 from .shapes import Shape, inner
 
 NEARER = 1 - 1e-6  # a light in the plane of a shape, as in a ceiling, is in front of it
+TOGETHER = 1 - 1e-12  # shares of a distance that are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,8 @@ def nearest(
 ) -> tuple[Tensor, Tensor]:
     """The distance to what rays (N, 3) meet first, inf where nothing, and its index, -1 where nothing.
 
-    `left` is the index of the shape that each ray leaves, which it cannot meet again.
+    Of shapes that are met together, as a rug and the floor below it, it is the first of the list. `left` is the index
+    of the shape that each ray leaves, which it cannot meet again.
     """
     best = torch.full_like(origin[:, 0], torch.inf)
     index = torch.full(best.shape, -1, dtype=torch.long, device=origin.device)
@@ -55,7 +57,7 @@ def nearest(
         t = shape.hit(origin, direction)
         if left is not None:
             t = torch.where(left == number, torch.inf, t)
-        nearer = t < best
+        nearer = t < best * TOGETHER
         best, index = torch.where(nearer, t, best), torch.where(nearer, number, index)
     return best, index
 

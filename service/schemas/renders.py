@@ -47,6 +47,12 @@ class EffectView(View):
         description="bound on what leaving it out changes in a pixel [radiance]; null where nothing bounds it"
     )
     forced: bool
+    partial: bool = Field(
+        False, description="whether error is a part of the bound only, which was too much already to leave it out"
+    )
+    estimated: bool = Field(
+        False, description="whether error is no bound: that of a mean radiance, or of a table's sampled albedo"
+    )
 
 
 class PlanView(View):

@@ -117,6 +117,16 @@ def test_diffuse_floor_under_a_light(light, way):
     assert error < 0.02
 
 
+def test_a_large_light_near_by_is_sampled_by_the_material_too():
+    """An endless ceiling is an even sky; points drawn on it lie mostly at its far ends."""
+    lamp = RectangleLight(center=(0, 0, 1), edge_u=(0, 100, 0), edge_v=(100, 0, 0), radiance=1.0)
+    view = Camera(position=(3, 0, 0.8), look_at=(0, 0, 0), fov_deg=10, width=4, height=4)
+    scene = Scene(camera=view, objects=[Plane(material="lambert(kd=1)")], lights=[lamp], samples=256)
+    image = render(scene)
+    assert image.plan["brdf sampling"].reason == "a light is near and large"
+    assert float((image.pixels - 1).abs().max()) < 0.05
+
+
 def test_shadows():
     """A sphere between a light and the floor: dark where it blocks, and nothing else is changed."""
     view = Camera(position=(3, 0, 1.5), look_at=(0, 0, 0), fov_deg=20, width=16, height=16)
@@ -130,6 +140,25 @@ def test_shadows():
     assert torch.equal(image[dark], torch.zeros_like(image[dark]))
     torch.testing.assert_close(image[~dark], torch.ones_like(image[~dark]))
     assert not bool(render(scene, plan(scene, 1e-3, {"shadow rays": False})).pixels.reshape(-1, 3)[rows].eq(0).any())
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["level", "tilted"])
+@pytest.mark.parametrize("light", [Directional(direction=(0.3, 0.2, 1), irradiance=math.pi), Dome(radiance=1.0)])
+def test_a_rug_on_a_floor_is_not_shaded_by_it(light, turned):
+    """Shapes of one plane do not shade each other by rounding, and the first of them is seen."""
+    u, v, up = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    if turned:
+        up = (0.3 / 1.13**0.5, 0.2 / 1.13**0.5, 1 / 1.13**0.5)
+        u = (up[2] / math.hypot(up[0], up[2]), 0.0, -up[0] / math.hypot(up[0], up[2]))
+        v = (up[1] * u[2] - up[2] * u[1], up[2] * u[0] - up[0] * u[2], up[0] * u[1] - up[1] * u[0])
+    view = Camera(position=(4.1, 0.37, 2.3), look_at=(0.1, 0.03, 0), width=24, height=24, fov_deg=5)
+    rug = Rectangle(center=(0, 0, 0), edge_u=u, edge_v=v, material="lambert(kd=0.6)")
+    floor = Plane(
+        point=[0.1 * (a + b) for a, b in zip(u, v, strict=True)], normal_direction=up, material="lambert(kd=0)"
+    )
+    image = render(Scene(camera=view, objects=[rug, floor], lights=[light], samples=2)).pixels
+    facing = 1.0 if isinstance(light, Dome) else sum(a * b for a, b in zip(light.direction, up, strict=True))
+    torch.testing.assert_close(image, torch.full_like(image, 0.6 * facing))
 
 
 def test_a_white_room_is_as_bright_as_the_sky():
@@ -161,6 +190,15 @@ def test_noise_is_what_it_says_and_stops():
     lit = image.noise[..., 0] > 1e-4
     assert 0.7 < float(z[lit][:, 0].square().mean().sqrt()) < 1.4
     assert torch.equal(image.pixels, render(quick).pixels)
+
+
+def test_progress_is_told_tile_after_tile(monkeypatch):
+    """The first pass of a large image may take long."""
+    monkeypatch.setattr("brdfcore.render.progressive.TILE", 512)
+    scene = lone_sphere("lambert(kd=0.5)", [SphereLight(center=(3, 3, 3), radius=1, radiance=5.0)], samples=32)
+    shares: list[float] = []
+    render(scene, progress=shares.append)
+    assert shares == [(k + 1) / 10 for k in range(10)]
 
 
 def test_a_raster_of_rays_is_their_mean():

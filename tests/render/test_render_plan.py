@@ -86,6 +86,28 @@ def test_what_is_left_out_is_bounded(light):
             assert float(lost.max()) > 0.5 * effect.error, effect.name
 
 
+@pytest.mark.parametrize("text", ["ggx(schlick, ks=0.5, f0=0.3, a=0.05)", "ashikhmin_shirley(nu=5, nv=500)"])
+def test_what_is_forced_off_is_bounded_as_a_whole(text):
+    """Also where a few points, or direct light, were too much already; of an effect that is on, that part is told."""
+    scene = lone_sphere(f"lambert(kd=0.3) + {text}", [SUN], size=32)
+    first = plan(scene, 1e-6)
+    whole = render(scene, first).pixels
+    for effect in first.effects:
+        if ": " in effect.name:
+            chosen = plan(scene, 1e-6, {effect.name: False})
+            lost = float((whole - render(scene, chosen).pixels).abs().max())
+            assert lost <= chosen.error * (1 + 1e-9), effect.name
+            assert not chosen[effect.name].partial
+            assert effect.partial
+    assert "> " in next(line for line in str(first).splitlines() if line.startswith("sphere 1: lambert"))
+    objects = [*scene.objects, Plane(point=(0, 0, -1), material="lambert(kd=0.8)")]
+    among = Scene(camera=camera(), objects=objects, lights=[SKY])
+    name = "sphere 1: lambert"
+    first, chosen = plan(among, 1e-4), plan(among, 1e-4, {name: False})
+    assert first[name].partial
+    assert chosen[name].error > 1.5 * first[name].error
+
+
 def test_force_and_its_errors():
     scene = lone_sphere("lambert", [SKY])
     chosen = plan(scene, force={"sphere 1: lambert": False, "shadow rays": True})
@@ -98,8 +120,20 @@ def test_force_and_its_errors():
         plan(scene, force={"shadows": True})
     with pytest.raises(InvalidValueError, match=r"^Expected light sampling or brdf sampling to be on, got both"):
         plan(scene, force={"albedo look-up": False, "brdf sampling": False})
+    floor = Plane(point=(0, 0, -1), material=scene.objects[0].material)
+    pair = Scene(camera=scene.camera, objects=[*scene.objects, floor], lights=[SKY])
+    for made, force in ((pair, {}), (scene, {"sample weights": False})):
+        with pytest.raises(
+            InvalidValueError,
+            match=r"^Expected albedo look-up to be off where there are several objects or uniform weights",
+        ):
+            plan(made, force={"albedo look-up": True} | force)
     with pytest.raises(InvalidValueError, match=r"^Expected tolerance to be a finite number from 0, got -1\."):
         plan(scene, -1.0)
+    with pytest.raises(InvalidValueError, match=r"^Expected tolerance to be a finite number from 0, got 'low'\."):
+        plan(scene, "low")
+    with pytest.raises(InvalidValueError, match=r"^Expected force of 'shadow rays' to be True or False, got 'off'\."):
+        plan(scene, force={"shadow rays": "off"})
 
 
 def test_the_table_says_it_all():
@@ -119,10 +153,53 @@ def test_the_table_says_it_all():
     assert chosen.cost > plan(endless, force={"interreflection 1": False}).cost > 0
 
 
+def test_what_is_no_bound_is_told_as_an_estimate():
+    """Caustics of lights without extent are as bright as they like; diffuse surfaces have none."""
+    for material, word, flag in (("ggx(ks=0.5)", "about", True), ("lambert(kd=0.5)", "at most", False)):
+        objects = [Sphere(material=material, **BALL), Plane(point=(0, 0, -1), material="lambert(kd=0.3)")]
+        chosen = plan(Scene(camera=camera(), objects=objects, lights=[SUN]), 1e-2)
+        last = [effect for effect in chosen.effects if effect.bounce][-1]
+        assert (last.on, last.estimated) == (False, flag)
+        assert str(chosen).splitlines()[-1].startswith(f"left out: {word} {chosen.error:.1e}")
+        assert ("~ " in str(chosen)) == flag
+
+
+def test_a_bounce_that_is_forced_brings_those_before_it():
+    objects = [Sphere(material="lambert(kd=0.5)", **BALL), Plane(point=(0, 0, -1), material="lambert(kd=0.5)")]
+    scene = Scene(camera=camera(), objects=objects, lights=[SKY])
+    assert plan(scene, 0.5).depth < 5
+    chosen = plan(scene, 0.5, {"interreflection 5": True})
+    assert chosen.depth == 5
+    assert [effect.forced for effect in chosen.effects if effect.bounce] == [False] * 4 + [True, False]
+    with pytest.raises(BrdfError, match=r"^Expected an effect to be a known name, got 'interreflection 5'\."):
+        plan(scene, 0.5, {"interreflection 5": True, "interreflection 2": False})
+
+
 def test_two_objects_of_one_name_have_two_rows():
     objects = [Sphere(name="ball", material="lambert", center=(0, k, 0), radius=0.4) for k in (0, 1)]
     chosen = plan(Scene(camera=camera(), objects=objects, lights=[SKY]))
     assert {"ball 1: lambert", "ball 2: lambert"} <= {effect.name for effect in chosen.effects}
+
+
+def test_names_are_told_from_numbers_and_from_interreflections():
+    """An object may have the name that another gets, or that of an effect."""
+    names = ("", "sphere 1", "interreflection 1")
+    objects = [
+        Sphere(name=name, material=f"lambert(kd=0.{k + 1})", center=(0, k, 0), radius=0.4)
+        for k, name in enumerate(names)
+    ]
+    chosen = plan(Scene(camera=camera(), objects=objects, lights=[SKY]), bounces=1)
+    terms = [effect for effect in chosen.effects if effect.name.endswith(": lambert")]
+    assert [effect.name for effect in terms] == [
+        "sphere 1: lambert",
+        "sphere 1 2: lambert",
+        "interreflection 1: lambert",
+    ]
+    assert len({effect.error for effect in terms}) == 3
+    assert [effect.name for effect in chosen.effects if effect.bounce] == ["interreflection 1", "interreflection 2"]
+    force = {effect.name: False for effect in terms}
+    black = plan(chosen.scene, force=force, bounces=1)
+    assert black.error >= sum(effect.error for effect in terms)
 
 
 class Counted(TorchDispatchMode):

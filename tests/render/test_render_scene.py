@@ -56,6 +56,9 @@ def test_a_file_is_read_and_a_wrong_one_told(tmp_path):
     (tmp_path / "bad.json").write_text("{")
     with pytest.raises(InvalidValueError, match=r"^Expected bad.json to be JSON, got: .*Correct it there\.$"):
         Scene.load(tmp_path / "bad.json")
+    (tmp_path / "deep.json").write_text("[" * 10**5)
+    with pytest.raises(InvalidValueError, match=r"^Expected deep.json to be JSON, got: maximum recursion depth"):
+        Scene.load(tmp_path / "deep.json")
     with pytest.raises(FormatError, match=r"^Expected scene to be a readable file, got 'none.json' \(No such file"):
         Scene.load(tmp_path / "none.json")
     with pytest.raises(BrdfError, match=r"^Expected a scene to be a known name, got 'furnance'"):
@@ -163,6 +166,8 @@ def test_a_scene_of_wrong_parts():
         Scene(camera=camera(), objects=[Dome(radiance=1)], lights=[Dome(radiance=1)])
     with pytest.raises(InvalidValueError, match=r"^Expected lights to be a sequence of Lights, got"):
         Scene(camera=camera(), objects=[ball], lights=[ball])
+    with pytest.raises(InvalidValueError, match=r"^Expected camera to be a Camera, got 3\."):
+        Scene(camera=3, objects=[ball], lights=[Dome(radiance=1)])
     with pytest.raises(InvalidValueError, match=r"^Expected material to be a Material, got int"):
         Sphere(material=3, **BALL)
     with pytest.raises(InvalidValueError, match=r"^Expected camera.position to be outside of objects\[0\]"):
@@ -179,3 +184,28 @@ def test_inside_and_distances():
     inside = torch.zeros(1, 3, dtype=torch.float64)
     up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64)
     assert [float(x) for x in light.met(inside, up, up)] == pytest.approx([2, 1 / (4 * torch.pi)])
+
+
+@pytest.mark.parametrize("length", [1e-6, 1.0, 1e20])
+def test_rectangles_of_any_size_face_one_side(length):
+    """As large as numbers may be, and as small: the normal is of unit length."""
+    wall = Rectangle(material="lambert", center=(0, 0, 0), edge_u=(length, 0, 0), edge_v=(0, length, 0))
+    origin = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64)
+    assert wall.normal(origin).tolist() == origin.tolist()
+    assert wall.hit(origin, -origin).tolist() == [1.0]
+
+
+def test_the_materials_x_axis_runs_along_the_tangent():
+    """Up a sphere's meridians, along a plane's x and a rectangle's first edge, unless a tangent is given; y follows."""
+    ball = Sphere(material="lambert", center=(0, 0, 0), radius=1)
+    turned = Sphere(material="lambert", center=(0, 0, 0), radius=1, tangent=(3, 2, 0))
+    wall = Rectangle(material="lambert", center=(0, 0, 0), edge_u=(0, 2, 0), edge_v=(0, 0, 2))
+    for shape, point, x, y in (
+        (ball, [1, 0, 0], [0, 0, 1], [0, -1, 0]),
+        (turned, [1, 0, 0], [0, 1, 0], [0, 0, 1]),
+        (wall, [0, 0, 0], [0, 1, 0], [0, 0, 1]),
+        (Plane(material="lambert"), [0, 0, 0], [1, 0, 0], [0, 1, 0]),
+    ):
+        at = torch.tensor([point], dtype=torch.float64)
+        axes = shape.frame(shape.normal(at))
+        assert [axis[0].tolist() for axis in axes[:2]] == [x, y]
