@@ -12,11 +12,12 @@ from typing import Final
 from ..errors import FormatError, unknown_name
 from . import alta, arrow, astm, cornell, curet, delimited, merl, nist, npy, npz, parquet, rgl
 from ._format import Format
+from ._size import at_most
 from ._text import brief, number
 from .delimited import write_csv
 from .samples import ANGLE_UNITS, QUANTITIES, Masked, Samples
 
-__all__ = ["ANGLE_UNITS", "FORMATS", "QUANTITIES", "Format", "Masked", "Samples", "read", "write_csv"]
+__all__ = ["ANGLE_UNITS", "FORMATS", "QUANTITIES", "Format", "Masked", "Samples", "at_most", "read", "write_csv"]
 
 FORMATS: Final[dict[str, Format]] = {
     module.FORMAT.name: module.FORMAT

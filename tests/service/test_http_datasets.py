@@ -12,6 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
+import pyarrow
+import pyarrow.parquet
 import pytest
 from fastapi import Request
 from service_cases import csv_file
@@ -70,6 +72,24 @@ def test_the_same_file_at_the_same_time_is_one_dataset(tmp_path: pathlib.Path) -
         added = list(pool.map(add, range(8)))
     assert len({name for name, _ in added}) == 1
     assert sum(new for _, new in added) == 1
+
+
+@pytest.mark.parametrize("kind", ["parquet", "arrow"])
+def test_columns_of_equal_values_are_refused_before_they_are_unpacked(http: TestClient, kind: str) -> None:
+    rows = 200_000
+    names = ("theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg", "value")
+    table = pyarrow.table({name: np.full(rows, 0.5) for name in names}).replace_schema_metadata({"quantity": "brdf"})
+    file = io.BytesIO()
+    if kind == "parquet":
+        pyarrow.parquet.write_table(table, file)
+    else:
+        options = pyarrow.ipc.IpcWriteOptions(compression="zstd")
+        with pyarrow.ipc.new_file(file, table.schema, options=options) as writer:
+            writer.write_table(table)
+    assert len(file.getvalue()) < 2**20
+    answer = http.post("/v1/datasets", content=file.getvalue())
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["detail"].startswith("Expected a file of at most 131,072 numbers, got ")
 
 
 def test_an_archive_of_much_is_refused_before_it_is_unpacked(http: TestClient, settings: Settings) -> None:
