@@ -63,6 +63,7 @@ PARAMETERS: dict[str, Any] = {
     "quantity": "brdf",
     "angle_unit": "degrees",
     "columns": "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value",
+    "rgb": False,
     "scale": "log",
     "theta_i_deg": [30, 60],
     "channel": "r",

@@ -9,6 +9,7 @@ from fit_cases import TRUE, directions, measured_from
 
 import brdfcore as bc
 from brdfcore.errors import BrdfError
+from brdfcore.fitting.every_error import errors
 from brdfcore.fitting.result import STATUSES
 
 MODEL = "lambert + ward_bounded(isotropic)"
@@ -262,3 +263,11 @@ def test_large_data_use_a_subset_for_starts_and_all_of_it_for_the_result() -> No
     assert fit.status == "converged"
     half = bc.fit(samples.subset(torch.arange(3000)), MODEL)
     assert fit.standard_errors["ward_bounded.a"] < 0.9 * half.standard_errors["ward_bounded.a"]
+
+
+def test_errors_under_other_losses_are_computed_when_they_are_read(three_channels: bc.Samples) -> None:
+    fit = bc.fit(three_channels, MODEL)
+    assert "errors" not in vars(fit)
+    assert fit.errors == pytest.approx(errors(fit.material, three_channels), abs=1e-12)
+    assert set(fit.errors) == {*bc.LOSSES, "cosine_rms"}
+    assert "errors" in vars(fit)

@@ -64,7 +64,8 @@ def test_texts_do_not_overlap_and_stay_inside(compared: bc.Comparison, losses: l
 
 
 def test_an_error_of_zero_and_an_unknown_loss(compared: bc.Comparison) -> None:
-    exact = dataclasses.replace(compared.fits[0], errors=dict.fromkeys(compared.fits[0].errors, 0.0))
+    exact = dataclasses.replace(compared.fits[0])
+    vars(exact)["errors"] = dict.fromkeys(compared.fits[0].errors, 0.0)
     figure = bc.plots.comparison(dataclasses.replace(compared, fits=(exact, *compared.fits[1:])), ["l2"])
     dot = next(line for line in figure.axes[0].get_lines() if line.get_marker() == "o")
     assert float(dot.get_xdata()[0]) == figure.axes[0].get_xlim()[0]

@@ -276,12 +276,14 @@ def test_a_stopped_worker_that_wakes_after_its_lease_is_refused(tmp_path: pathli
             return super().poll(seconds)
 
     (tmp_path / "other").mkdir()  # a lock of its own: a dispatcher of another machine, say
-    with dispatching(store, tmp_path, Stopped(["succeeded"])), dispatching(store, tmp_path / "other", Scripted([])):
+    with dispatching(store, tmp_path, Stopped(["succeeded"])):
         job = store.submit("{}", b"")
-        until(lambda: store.running().get(job.id) == 2)
-        woken.set()
-        time.sleep(0.3)
-        assert current(store, job).status == "running"
+        until(lambda: store.running().get(job.id) == 1)  # by the one that then sleeps
+        with dispatching(store, tmp_path / "other", Scripted([])):
+            until(lambda: store.running().get(job.id) == 2)
+            woken.set()
+            time.sleep(0.3)
+            assert current(store, job).status == "running"
     store.close()
 
 
