@@ -62,6 +62,8 @@ function energy(certificate) {
   return certificate.energy_conserving ? made("span", { class: "good" }, "conserves") : made("span", { class: "bad" }, "creates");
 }
 
+const ENDS = { converged: "Converged. ", undetermined: "Converged, with values left free. ", stopped_early: "Stopped early. " };
+
 function detail() {
   const fit = chosen();
   if (fit === null) return at("details").replaceChildren();
@@ -71,13 +73,13 @@ function detail() {
     ...parameters(result),
   ];
   if (result.undetermined.length > 0)
-    parts.push(made("p", { class: "said" }, `The data do not determine ${result.undetermined.join(", ")}: other values fit as well, so take the stated ones as examples.`));
-  for (const sentence of result.choices) parts.push(made("p", { class: "hint" }, sentence));
+    parts.push(made("p", { class: "said" }, `The data do not determine ${result.undetermined.join(", ")}: other values fit as well, so none is stated.`));
+  for (const sentence of [...result.warnings, ...result.choices]) parts.push(made("p", { class: "hint" }, sentence));
   parts.push(
     made("h3", {}, "Certificate"),
-    made("p", { class: `verdict ${result.certificate.energy_conserving ? "good" : "bad"}` }, result.certificate.verdict),
+    made("p", { class: `verdict ${!result.certificate.decided ? "" : result.certificate.energy_conserving ? "good" : "bad"}` }, result.certificate.verdict),
     made("p", { class: "hint" }, reciprocity(result.certificate)),
-    made("p", {}, made("b", {}, result.status === "converged" ? "Converged. " : "Stopped early. "), result.message),
+    made("p", {}, made("b", {}, ENDS[result.status]), result.message),
   );
   if (result.chi_square) parts.push(made("p", {}, `Chi-square ${shown(result.chi_square[0])} for ${result.chi_square[1]} degrees of freedom.`));
   if (result.conservation && !(result.conservation.free_max_albedo <= 1)) parts.push(made("p", {}, conserved(result)));
@@ -122,15 +124,15 @@ function parameters(result) {
  */
 function valuesIn(result, key, value, channels) {
   const what = result.units[key] ?? "";
-  if (!Array.isArray(value)) return [[made("span", { class: "code" }, key), shown(value), interval(result, key, result.intervals[key]), what]];
+  if (!Array.isArray(value)) return [[made("span", { class: "code" }, key), shown(value), interval(result, key, value, result.intervals[key]), what]];
   return channels.map((k) => [
-    made("span", { class: "code" }, `${key} (${result.channels[k]})`), shown(value[k]), interval(result, key, result.intervals[key]?.[k]), k === channels[0] ? what : "",
+    made("span", { class: "code" }, `${key} (${result.channels[k]})`), shown(value[k]), interval(result, key, value[k], result.intervals[key]?.[k]), k === channels[0] ? what : "",
   ]);
 }
 
-/** @param {any} result @param {string} key @param {number[] | null | undefined} interval */
-function interval(result, key, interval) {
-  if (result.undetermined.includes(key)) return "not determined by the data";
+/** @param {any} result @param {string} key @param {number | null} value @param {number[] | null | undefined} interval */
+function interval(result, key, value, interval) {
+  if (value === null) return "not determined by the data";
   if (result.fixed.includes(key)) return "held";
   return interval ? `${shown(interval[0])} to ${shown(interval[1])}` : "none: it lies at an end of its range, or is held";
 }
