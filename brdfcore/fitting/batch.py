@@ -51,9 +51,8 @@ def fit_batch(several: Iterable[Samples], model: str, **keywords: Any) -> list[F
                 ]
             cost = replace(made[0].cost, seconds=(time.perf_counter() - clock) / len(here))
             for i, one in zip(here, made, strict=True):
-                object.__setattr__(
-                    one, "cost", cost
-                )  # a copy of every field of every fit would take longer than a step
+                # a copy of every field of every fit would take longer than a step
+                object.__setattr__(one, "cost", cost)
                 found[i] = one
             done += len(here)
             say("done", 1.0, float(ends.outcome.loss.min()))

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from service_cases import measured_diffuser
+from service_cases import idling, measured_diffuser
 from starlette.testclient import TestClient
 
 from service.app import create_app
@@ -30,11 +30,9 @@ def idle_settings(settings: Settings) -> Settings:
 
 
 @pytest.fixture
-def idle(idle_settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
+def idle(idle_settings: Settings) -> Iterator[TestClient]:
     """A client of an app whose dispatcher never starts, so that jobs stay queued."""
-    monkeypatch.setattr("service.app.Dispatcher.start", lambda self: None)
-    monkeypatch.setattr("service.app.Dispatcher.stop", lambda self: None)
-    with TestClient(create_app(idle_settings), raise_server_exceptions=False) as client:
+    with idling(idle_settings) as client:
         yield client
 
 

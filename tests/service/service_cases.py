@@ -1,7 +1,16 @@
-"""Small measurements whose answer is known."""
+"""Small measurements whose answer is known, and an app that never starts a job."""
 
+import contextlib
 import math
+from collections.abc import Iterator
 from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from service.app import create_app
+from service.jobs.dispatcher import Dispatcher
+from service.settings import Settings
 
 KD = 0.4
 
@@ -27,3 +36,23 @@ def csv_file(rows: int = 24) -> bytes:
     for k, values in enumerate(samples["values"]):
         lines.append(",".join(repr(x) for x in (*(samples[name][k] for name in columns), *values)))
     return "\n".join(lines).encode()
+
+
+class Idle(Dispatcher):
+    """A dispatcher that never starts."""
+
+    def start(self) -> None:
+        """Leave every job queued."""
+
+    def stop(self) -> None:
+        """Nothing to end."""
+
+
+@contextlib.contextmanager
+def idling(settings: Settings) -> Iterator[TestClient]:
+    """A client of an app whose dispatcher never starts, so that jobs stay queued."""
+    with contextlib.ExitStack() as stack:
+        with pytest.MonkeyPatch.context() as patch:  # undone before another app starts
+            patch.setattr("service.app.Dispatcher", Idle)
+            client = stack.enter_context(TestClient(create_app(settings), raise_server_exceptions=False))
+        yield client

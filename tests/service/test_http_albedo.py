@@ -1,6 +1,5 @@
 """Albedos over HTTP: values at once, tables as jobs, and a sentence for everything else."""
 
-import contextlib
 import io
 import json
 import math
@@ -11,26 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from service_cases import idling
 from starlette.testclient import TestClient
 
 import brdfcore as bc
 from service.app import create_app
-from service.jobs.dispatcher import Dispatcher
 from service.settings import Settings
 
 TEXT = "lambert(kd=[0.5, 0.2]) + ward_bounded(isotropic, rs=0.3, a=0.2)"
 VALUES = {"material": TEXT, "theta_deg": [0.0, 45.0, 85.0], "tolerance": 1e-4}
 TABLE = {"material": "lambert(kd=0.5) + oren_nayar", "axes": {"oren_nayar.sigma": [0.1, 0.8], "lambert.kd": None}}
-
-
-class Idle(Dispatcher):
-    """A dispatcher that never starts."""
-
-    def start(self) -> None:
-        """Leave every job queued."""
-
-    def stop(self) -> None:
-        """Nothing to end."""
 
 
 @pytest.fixture(scope="module")
@@ -48,11 +37,7 @@ def http(settings: Settings) -> Iterator[TestClient]:
 @pytest.fixture(scope="module")
 def idle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     """A client of an app whose dispatcher never starts, so that tables stay queued."""
-    settings = Settings(data=tmp_path_factory.mktemp("idle"), workers=1)
-    with contextlib.ExitStack() as stack:
-        with pytest.MonkeyPatch.context() as patch:  # undone before another app starts
-            patch.setattr("service.app.Dispatcher", Idle)
-            client = stack.enter_context(TestClient(create_app(settings), raise_server_exceptions=False))
+    with idling(Settings(data=tmp_path_factory.mktemp("idle"), workers=1)) as client:
         yield client
 
 

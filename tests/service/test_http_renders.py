@@ -1,6 +1,5 @@
 """Renders over HTTP: a durable job, its plan and its image, and a sentence for everything else."""
 
-import contextlib
 import io
 import json
 import pathlib
@@ -9,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from service_cases import idling
 from starlette.testclient import TestClient
 
 import brdfcore as bc
 from brdfcore.render import SCENES, Scene, plan, render
 from service.app import create_app
-from service.jobs.dispatcher import Dispatcher
 from service.settings import Settings
 
 LONE: dict[str, Any] = {
@@ -23,16 +22,6 @@ LONE: dict[str, Any] = {
     "lights": [{"kind": "directional", "direction": [1, 0, 1], "irradiance": 3}],
 }
 NOISY = LONE | {"objects": [*LONE["objects"], {"kind": "plane", "point": [0, 0, -1], "material": "lambert(kd=0.4)"}]}
-
-
-class Idle(Dispatcher):
-    """A dispatcher that never starts."""
-
-    def start(self) -> None:
-        """Leave every job queued."""
-
-    def stop(self) -> None:
-        """Nothing to end."""
 
 
 @pytest.fixture(scope="module")
@@ -50,11 +39,7 @@ def http(settings: Settings) -> Iterator[TestClient]:
 @pytest.fixture(scope="module")
 def idle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     """A client of an app whose dispatcher never starts, so that renders stay queued."""
-    settings = Settings(data=tmp_path_factory.mktemp("idle"), workers=1)
-    with contextlib.ExitStack() as stack:
-        with pytest.MonkeyPatch.context() as patch:  # undone before another app starts
-            patch.setattr("service.app.Dispatcher", Idle)
-            client = stack.enter_context(TestClient(create_app(settings), raise_server_exceptions=False))
+    with idling(Settings(data=tmp_path_factory.mktemp("idle"), workers=1)) as client:
         yield client
 
 
