@@ -118,6 +118,9 @@ def test_the_numbers_come_as_json_and_as_npz(
     file.write_bytes(as_npz.content)
     assert float(bc.AlbedoTable.load(file)(0.3, **{"oren_nayar.sigma": 0.5, "lambert.kd": 0.1})) > 0
     assert http.get(path, headers={"accept": "text/csv"}).status_code == 406
+    tag = http.get(path, headers={"accept": "application/x-npz"}).headers["etag"]
+    assert http.get(path, headers={"accept": "application/x-npz", "if-none-match": tag}).status_code == 304
+    assert http.get(path, headers={"if-none-match": tag}).status_code == 200, "as JSON it is another file"
 
 
 def test_the_same_table_is_not_made_twice(http: TestClient, settings: Settings) -> None:
