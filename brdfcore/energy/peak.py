@@ -15,7 +15,6 @@ from .patch import ALONE, DEAREST, DENSE, Patch, Peak, grid, largest, largest_in
 from .scan import Scan, theta_of
 
 MIDDLE = 1e-4  # tolerance between the scan's and the caller's
-PATCHES = 4  # before what is left of doubt counts as error
 SPARE = 2.0  # how much higher than a parabola through its neighbours a top between the scan's points may be
 
 
@@ -44,9 +43,8 @@ def refined(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tup
     last = last._replace(error=last.error + abs(last.albedo - low.albedo))
     best = point(*_first(over, tolerance, scan))
     reach = over + SPARE * _rises(over)
-    for _ in range(PATCHES):
-        if float(reach.max()) <= max(best.albedo, last.albedo) + tolerance / 2 or scan.evaluations > DEAREST:
-            break
+    # as many patches as it takes: a level albedo has a doubtful edge at each of its azimuths
+    while float(reach.max()) > max(best.albedo, last.albedo) + tolerance / 2 and scan.evaluations <= DEAREST:
         patch = _patch(scan, *_first(reach, tolerance, scan))
         best = max(best, largest(scan, patch, tolerance), key=lambda peak: peak.albedo)
         reach[patch.covers(scan)] = -math.inf
@@ -76,12 +74,13 @@ def _ends(scan: Scan, end: Patch, tolerance: float) -> tuple[Peak, Peak]:
 def _settled(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tuple[Tensor, Tensor, Tensor]:
     """The largest of a scan (U, S, C) over its channels, its error, and the channel, (U, S) each.
 
-    To a quarter of the tolerance in the last row, and wherever the albedo may be the largest.
+    To a quarter of the tolerance wherever the albedo may be the largest of all, or of the last row.
     """
     (over, channel), doubt = total.max(-1), claimed.amax(-1)
     for asked in (MIDDLE, tolerance / 4):
-        unsure = over + doubt + SPARE * _rises(over) > (over - doubt).max()
-        unsure[-1] = True
+        above, below = over + doubt + SPARE * _rises(over), over - doubt
+        unsure = above > below.max()
+        unsure[-1] = above[-1] > below[-1].max()
         unsure &= doubt > asked
         u, s = (x[unsure] for x in torch.meshgrid(scan.u, scan.s, indexing="ij"))
         if len(u):
