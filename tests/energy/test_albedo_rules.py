@@ -216,16 +216,6 @@ def test_a_narrow_and_a_wide_width_are_a_reference_too(text, theta, phi, monkeyp
     assert float((found.values - without.values).abs().max()) <= 1e-9
 
 
-def test_dense_rays_pay_for_themselves_at_a_plain_tolerance():
-    """To 1e-6: a fortieth of the 9e5 directions that it takes without them, and the same albedo."""
-    form, values = prepared("ggx(constant, separable, ks=1, ax=0.061, ay=1.2)")
-    at = torch.tensor(1e-12).double(), torch.tensor(0.064).double()
-    found, reference = (bc.energy.of_form(form, values, *at, tolerance) for tolerance in (1e-6, 1e-11))
-    assert found.met
-    assert found.evaluations < 1e5
-    assert float((found.values - reference.values).abs().max()) <= float(found.error.max())
-
-
 def test_a_masking_that_is_smooth_but_not_analytic_is_a_reference_too():
     """To 1e-12 where a lobe is narrow and wide at once: that takes 900 nodes on a ray, and no more than 500 rays."""
     form, values = prepared("beckmann(separable, ks=0.5856, f0=0.8094, ax=0.0067736, ay=9.8129)")
