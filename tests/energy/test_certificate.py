@@ -284,6 +284,12 @@ def test_no_dense_scan_contradicts_a_certificate_in_many_cases(choice, number):
     contradict(choice, number, 60, 13)
 
 
+@pytest.mark.full
+def test_a_lopsided_limit_may_take_most_of_what_may_be_spent():
+    found = bc.certify(bc.material("ggx(separable, schlick, anisotropic, ks=0.897, f0=0.136, ax=0.061, ay=1.204)"))
+    assert found.error <= 1e-5
+
+
 def contradict(choice: bc.Model, number: int, angles: int, azimuths: int) -> None:
     """Hold a certificate against a scan that may be denser."""
     material = drawn(choice, number)
