@@ -8,7 +8,7 @@ its upper end, all of them. More unknowns, or gray ones beside coloured ones, ar
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -54,6 +54,7 @@ class Faces:
     origin: Tensor  # (F, C, L)
     directions: Tensor  # (F, L, L), 0 in the columns of what the face holds
     lower: int  # how many of the first faces touch no upper end
+    along_axes: bool  # every face: no triangle's slanted edge is among them
 
     @classmethod
     def of(cls, blocks: tuple[Block, ...]) -> "Faces":
@@ -70,12 +71,13 @@ class Faces:
             made.append((any(upper for upper, _, _ in choice), origin, directions))
         made.sort(key=lambda face: face[0])
         lower = sum(not upper for upper, _, _ in made)
-        return cls(blocks, torch.stack([o for _, o, _ in made]), torch.stack([d for _, _, d in made]), lower)
+        straight = all(len(block.at) == 1 for block in blocks)
+        return cls(blocks, torch.stack([o for _, o, _ in made]), torch.stack([d for _, _, d in made]), lower, straight)
 
     def channels(self, channel: Tensor) -> "Faces":
         """The same of chosen channels (P,), again and again where they repeat."""
         blocks = tuple(Block(block.at, block.low[channel], block.high[channel]) for block in self.blocks)
-        return Faces(blocks, self.origin[:, channel], self.directions, self.lower)
+        return replace(self, blocks=blocks, origin=self.origin[:, channel])
 
     def below(self, z: Tensor) -> Tensor:
         """Where z (..., C, L) leaves the polytope through its lower ends, (..., C)."""
@@ -115,23 +117,43 @@ def _best(faces: Faces, among: int, gram: Tensor, right: Tensor) -> tuple[Tensor
     start = faces.origin[:among].unsqueeze(0)  # (1, F, C, L)
     d = faces.directions[:among].unsqueeze(1)  # (F, 1, L, L)
     g, r = gram.unsqueeze(1), right.unsqueeze(1)  # (B, 1, C, L, L), (B, 1, C, L)
-    slope = r - (g * start.unsqueeze(-2)).sum(-1) if bool(start.any()) else r
-    if among > faces.lower:
-        system, wanted = d.mT @ g @ d, (d.mT @ slope.unsqueeze(-1)).squeeze(-1)
-        t = solve_definite(system, wanted)
-        z = start + (d @ t.unsqueeze(-1)).squeeze(-1)  # (B, F, C, L)
-        wrong = faces.below(z) | faces.beyond(z)
-    else:  # along axes: no products of tiny matrices
+    offset = bool(start.any())
+    slope = r - _applied(g, start) if offset else r
+    if faces.along_axes or among <= faces.lower:  # no products of tiny matrices, which cost a call each
         e = d.diagonal(dim1=-2, dim2=-1)
         system, wanted = g * e.unsqueeze(-1) * e.unsqueeze(-2), slope * e
+        t = step = solve_definite(system, wanted)
+    else:
+        system, wanted = d.mT @ g @ d, (d.mT @ slope.unsqueeze(-1)).squeeze(-1)
         t = solve_definite(system, wanted)
-        z = start + t
-        wrong = faces.below(z)
+        step = (d @ t.unsqueeze(-1)).squeeze(-1)
+    z = start + step  # (B, F, C, L)
     if among == 1:
         return z[:, 0], torch.zeros(z[:, 0, :, 0].shape, dtype=torch.long)
-    value = -(t * wanted).sum(-1) - (start * (slope + r)).sum(-1)
-    face = torch.where(wrong, torch.inf, value).argmin(1)  # (B, C)
+    wrong = faces.below(z)
+    value = -_dot(t, wanted)
+    if offset:
+        value -= _dot(start, slope + r)
+    if among > faces.lower:
+        wrong |= faces.beyond(z)
+    face = value.masked_fill_(wrong, torch.inf).argmin(1)  # (B, C)
     return z.gather(1, face[:, None, :, None].expand(-1, 1, -1, z.shape[-1])).squeeze(1), face
+
+
+def _dot(a: Tensor, b: Tensor) -> Tensor:
+    """The sums of a b over a last dimension of few (..., L), by element: a reduction over few is slow."""
+    total = a[..., 0] * b[..., 0]
+    for i in range(1, a.shape[-1]):
+        total = torch.addcmul(total, a[..., i], b[..., i])
+    return total
+
+
+def _applied(matrix: Tensor, vector: Tensor) -> Tensor:
+    """Products of symmetric matrices (..., L, L) of few rows and vectors (..., L), by element."""
+    total = matrix[..., 0] * vector[..., :1]
+    for i in range(1, matrix.shape[-1]):
+        total = torch.addcmul(total, matrix[..., i], vector[..., i : i + 1])
+    return total
 
 
 def solve_definite(matrix: Tensor, right: Tensor) -> Tensor:
