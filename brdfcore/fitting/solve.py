@@ -79,6 +79,10 @@ class Faces:
         blocks = tuple(Block(block.at, block.low[channel], block.high[channel]) for block in self.blocks)
         return replace(self, blocks=blocks, origin=self.origin[:, channel])
 
+    def outside(self, z: Tensor) -> Tensor:
+        """Where z (..., C, L) lies outside the polytope, (..., C)."""
+        return self.below(z) | self.beyond(z)
+
     def below(self, z: Tensor) -> Tensor:
         """Where z (..., C, L) leaves the polytope through its lower ends, (..., C)."""
         out = torch.zeros(z.shape[:-1], dtype=torch.bool)
@@ -96,14 +100,17 @@ class Faces:
         return out
 
 
-def solve_faces(faces: Faces, gram: Tensor, right: Tensor) -> tuple[Tensor, Tensor]:
-    """The minimum z (..., C, L) and the directions (..., C, L, L) of its face, for G (..., C, L, L), r (..., C, L)."""
+def solve_faces(faces: Faces, gram: Tensor, right: Tensor, *, ends: bool = True) -> tuple[Tensor, Tensor]:
+    """The minimum z (..., C, L) and the directions (..., C, L, L) of its face, for G (..., C, L, L), r (..., C, L).
+
+    Without the polytope's ends it is that of all space, whose value none in the polytope is below.
+    """
     shape = torch.broadcast_tensors(gram[..., 0], right)[0].shape  # broadcast_shapes would import half of torch
     channels, count = shape[-2:]
     gram = gram.expand(*shape, count).reshape(-1, channels, count, count)
     right = right.expand(shape).reshape(-1, channels, count)
     z, face = _best(faces, 1, gram, right)
-    for leaves, among in ((faces.below, faces.lower), (faces.beyond, len(faces.origin))):
+    for leaves, among in ((faces.below, faces.lower), (faces.beyond, len(faces.origin))) if ends else ():
         row, channel = leaves(z).nonzero(as_tuple=True)
         if len(row):
             systems = gram[row, channel].unsqueeze(0), right[row, channel].unsqueeze(0)
@@ -118,38 +125,38 @@ def _best(faces: Faces, among: int, gram: Tensor, right: Tensor) -> tuple[Tensor
     d = faces.directions[:among].unsqueeze(1)  # (F, 1, L, L)
     g, r = gram.unsqueeze(1), right.unsqueeze(1)  # (B, 1, C, L, L), (B, 1, C, L)
     offset = bool(start.any())
-    slope = r - _applied(g, start) if offset else r
+    slope = r - times(g, start) if offset else r
     if faces.along_axes or among <= faces.lower:  # no products of tiny matrices, which cost a call each
         e = d.diagonal(dim1=-2, dim2=-1)
         system, wanted = g * e.unsqueeze(-1) * e.unsqueeze(-2), slope * e
         t = step = solve_definite(system, wanted)
     else:
-        system, wanted = d.mT @ g @ d, (d.mT @ slope.unsqueeze(-1)).squeeze(-1)
+        system, wanted = d.mT @ g @ d, times(d.mT, slope)
         t = solve_definite(system, wanted)
-        step = (d @ t.unsqueeze(-1)).squeeze(-1)
+        step = times(d, t)
     z = start + step  # (B, F, C, L)
     if among == 1:
         return z[:, 0], torch.zeros(z[:, 0, :, 0].shape, dtype=torch.long)
     wrong = faces.below(z)
-    value = -_dot(t, wanted)
+    value = -dot(t, wanted)
     if offset:
-        value -= _dot(start, slope + r)
+        value -= dot(start, slope + r)
     if among > faces.lower:
         wrong |= faces.beyond(z)
     face = value.masked_fill_(wrong, torch.inf).argmin(1)  # (B, C)
     return z.gather(1, face[:, None, :, None].expand(-1, 1, -1, z.shape[-1])).squeeze(1), face
 
 
-def _dot(a: Tensor, b: Tensor) -> Tensor:
-    """The sums of a b over a last dimension of few (..., L), by element: a reduction over few is slow."""
+def dot(a: Tensor, b: Tensor) -> Tensor:
+    """The sums of a b over a last dimension of few (..., L), (...), by element: a reduction over few is slow."""
     total = a[..., 0] * b[..., 0]
     for i in range(1, a.shape[-1]):
         total = torch.addcmul(total, a[..., i], b[..., i])
     return total
 
 
-def _applied(matrix: Tensor, vector: Tensor) -> Tensor:
-    """Products of symmetric matrices (..., L, L) of few rows and vectors (..., L), by element."""
+def times(matrix: Tensor, vector: Tensor) -> Tensor:
+    """The products (..., K) of small matrices (..., K, L) and vectors (..., L), by element as well."""
     total = matrix[..., 0] * vector[..., :1]
     for i in range(1, matrix.shape[-1]):
         total = torch.addcmul(total, matrix[..., i], vector[..., i : i + 1])
