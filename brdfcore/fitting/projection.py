@@ -127,12 +127,28 @@ class Projection:
 
     def affine(self, x: Tensor, natural: Values, *, slopes: bool = True) -> Affine:
         """The coefficients as functions of the unknowns at the shapes of x (S, D), and its natural values."""
+        if self._shaped:
+            return self._affine(x, natural, slopes=slopes)
+        return Affine(*(part.expand(len(x), *part.shape[1:]) for part in self._same))
+
+    @functools.cached_property
+    def _shaped(self) -> bool:
+        """Whether coefficients read what is searched; else they are the same in all rows."""
+        return any(p in self.shapes for _, p in self.problem.columns.coefficient_derivatives)
+
+    @functools.cached_property
+    def _same(self) -> Affine:
+        """The coefficients of one row."""
+        x = self.problem.pack(self.problem.plan.start).unsqueeze(0)
+        return self._affine(x, self.problem.natural(x), slopes=False)
+
+    def _affine(self, x: Tensor, natural: Values, *, slopes: bool) -> Affine:
         problem = self.problem
         shape = (self.count + 1, len(x), 1, problem.channels)
         values = {**natural, **self._corners}
         c = problem.columns.coefficients(values, shape).squeeze(2)  # (L + 1, S, C, K)
         names = len(problem.keys)
-        if slopes and any(p in self.shapes for _, p in problem.columns.coefficient_derivatives):
+        if slopes and self._shaped:
             d = problem.columns.coefficient_slopes(values, shape).squeeze(2) * problem.chain(x).unsqueeze(-2)
         else:
             d = c.new_zeros(1, 1, 1, 1, names).expand(*c.shape, names)
