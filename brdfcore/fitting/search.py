@@ -15,7 +15,7 @@ from ..formats.samples import Samples
 from .adam import adam
 from .lbfgs import lbfgs
 from .least_squares import least_squares
-from .levenberg_marquardt import OnStep, Outcome
+from .levenberg_marquardt import DECREMENT, OnStep, Outcome
 from .losses import LOSSES
 from .plan import Plan
 from .problem import Problem
@@ -142,7 +142,9 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
         if not several_lobes(projection):
             hopeful = shares.reshape(-1) <= _HOPELESS
             x, which = x[hopeful], which[hopeful]
-        best, iterations = _raced(projection, x, which, tell)
+        lone = torch.bincount(which, minlength=materials)[which] == 1  # without a rival: runs to its end at once
+        ends = torch.where(lone, DECREMENT, _RACE) if whole is coarse else _RACE
+        best, iterations = _raced(projection, x, which, tell, ends)
         if several_lobes(projection):
             again = torch.cat([best.x.unsqueeze(1), rescan(projection, best.x, _AGAIN, seed)], dim=1)
             which = torch.arange(materials).repeat_interleave(again.shape[1])
@@ -177,9 +179,11 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     return Found(whole, best, each, sum(seen.values()), iterations, name)
 
 
-def _raced(projection: Projection, x: Tensor, which: Tensor, tell: OnStep) -> tuple[Outcome, int]:
+def _raced(
+    projection: Projection, x: Tensor, which: Tensor, tell: OnStep, tolerance: float | Tensor = _RACE
+) -> tuple[Outcome, int]:
     """Where the best of each material's starts x (S, D) ends, and the iterations that took."""
-    outcome = raced = variable_projection(projection, x, which, _RACE, on_step=tell)
+    outcome = raced = variable_projection(projection, x, which, tolerance, on_step=tell)
     if projection.may_leave_the_box:
         outcome = least_squares(projection.problem, raced.x, which, on_step=tell)
     return outcome.pick(_best(outcome.loss, which, projection.problem.materials)), raced.iterations
