@@ -5,6 +5,7 @@ solutions of the cosine loss join the starts of Levenberg-Marquardt on all value
 whatever came before: it keeps every end of the box, and computes residuals one by one, so that none cancel.
 """
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -57,9 +58,10 @@ class Found:
         alone = Problem(whole.plan, [], whole.loss_kind, robust_scale=scale, data=whole.data.rows(which))
         return replace(self, problem=alone, outcome=self.outcome.pick(which))
 
-    def cost(self, materials: int) -> Cost:
-        """What each of so many materials cost but for the time, which ends later; uncertainty evaluates once more."""
-        return Cost(0.0, self.evaluations // materials + 1, self.iterations, self.starts, self.optimizer)
+    def cost(self, begun: float, materials: int) -> Cost:
+        """What each of so many materials cost since then, by the clock; uncertainty evaluates once more."""
+        seconds = (time.perf_counter() - begun) / materials
+        return Cost(seconds, self.evaluations // materials + 1, self.iterations, self.starts, self.optimizer)
 
 
 def search(plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, seed: int, say: Say) -> Found:

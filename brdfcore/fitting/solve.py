@@ -109,7 +109,9 @@ def solve_faces(faces: Faces, gram: Tensor, right: Tensor, *, ends: bool = True)
     channels, count = shape[-2:]
     gram = gram.expand(*shape, count).reshape(-1, channels, count, count)
     right = right.expand(shape).reshape(-1, channels, count)
-    z, face = _best(faces, 1, gram, right)
+    inside = faces.origin[0]  # of the first face, on which every unknown is free
+    z = inside + solve_definite(gram, right - times(gram, inside))
+    face = torch.zeros(z.shape[:-1], dtype=torch.long)
     for leaves, among in ((faces.below, faces.lower), (faces.beyond, len(faces.origin))) if ends else ():
         row, channel = leaves(z).nonzero(as_tuple=True)
         if len(row):
@@ -135,8 +137,6 @@ def _best(faces: Faces, among: int, gram: Tensor, right: Tensor) -> tuple[Tensor
         t = solve_definite(system, wanted)
         step = times(d, t)
     z = start + step  # (B, F, C, L)
-    if among == 1:
-        return z[:, 0], torch.zeros(z[:, 0, :, 0].shape, dtype=torch.long)
     wrong = faces.below(z)
     value = -dot(t, wanted)
     if offset:
@@ -170,11 +170,12 @@ def solve_definite(matrix: Tensor, right: Tensor) -> Tensor:
     LAPACK would be called for each.
     """
     count = matrix.shape[-1]
-    diagonal = [matrix[..., i, i] for i in range(count)]
-    scale = [torch.where(x > 0, x.clamp(min=1e-300).rsqrt(), 0.0) for x in diagonal]
+    diagonal = matrix.diagonal(dim1=-2, dim2=-1)
+    seen = diagonal > 0
+    scaling = torch.where(seen, diagonal.clamp(min=1e-300).rsqrt(), 0.0)
+    scale, d = list(scaling.unbind(-1)), list(torch.where(seen, 1 + _RIDGE, 1.0).unbind(-1))
+    b = list((right * scaling).unbind(-1))
     m = [[matrix[..., i, j] * scale[i] * scale[j] for j in range(i)] for i in range(count)]
-    d = [torch.where(x > 0, 1 + _RIDGE, 1.0) for x in diagonal]
-    b = [right[..., i] * scale[i] for i in range(count)]
     for j in range(count):
         pivot = d[j].clamp(min=_RIDGE)
         for i in range(j + 1, count):
@@ -187,7 +188,7 @@ def solve_definite(matrix: Tensor, right: Tensor) -> Tensor:
         for k in range(i + 1, count):
             b[i] = b[i] - m[k][i] * b[k]
         b[i] = b[i] / d[i].clamp(min=_RIDGE)
-    return torch.stack([scale[i] * b[i] for i in range(count)], dim=-1)
+    return torch.stack(b, dim=-1) * scaling
 
 
 def solve_box(gram: Tensor, right: Tensor, low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:
