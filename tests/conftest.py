@@ -3,6 +3,8 @@
 import os
 import pathlib
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of numpy and scipy, who read it when they are loaded
+
 import hypothesis
 import pytest
 import torch
@@ -14,7 +16,13 @@ hypothesis.settings.load_profile("seeded")
 torch.set_num_threads(1)  # the tests' tensors are small, and threads that wait for each other make a busy machine slow
 
 # the shapes that annotations state are checked while tests run; to be installed before the modules are loaded
-install_import_hook(["brdfcore.geometry", "brdfcore.models", "brdfcore.parameters"], "beartype.beartype")
+CHECKS = install_import_hook(["brdfcore.geometry", "brdfcore.models", "brdfcore.parameters"], "beartype.beartype")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Benches measure what a user runs, without the checks of shapes."""
+    if config.getoption("markexpr") == "bench":
+        CHECKS.uninstall()
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from ..errors import SamplesError
@@ -92,11 +93,12 @@ def fit(
     say = Teller(progress)
     found = search(plan, [kept], loss, optimizer, seed, say)
     say("uncertainty", 0.95, float(found.outcome.loss[0]))
-    (result,) = fits(found.problem, found.outcome, [kept], [samples], seed, found.cost(1))
+    (result,) = fits(found.problem, found.outcome, [kept], [samples], seed, partial(found.cost, begun, 1))
     if conserve_energy:
         result = conserving(result, found, kept, samples, optimizer, say)
+        result = replace(result, cost=replace(result.cost, seconds=time.perf_counter() - begun))
     say("done", 1.0, result.objective)
-    return replace(result, cost=replace(result.cost, seconds=time.perf_counter() - begun))
+    return result
 
 
 def planned(several: Sequence[Samples], model: str, **keywords: Any) -> tuple[Plan, list[Samples]]:

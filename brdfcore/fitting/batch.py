@@ -1,9 +1,9 @@
 """`bc.fit_batch`: fits of one model to many materials, those that were measured at the same directions at once."""
 
-import hashlib
 import time
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from ..errors import SamplesError
@@ -42,18 +42,17 @@ def fit_batch(several: Iterable[Samples], model: str, **keywords: Any) -> list[F
             loss, optimizer = keywords.get("loss", "cosine"), keywords.get("optimizer", "auto")
             ends = search(plan, several_, loss, optimizer, seed, say)
             say("uncertainty", 0.95, float(ends.outcome.loss.min()))
-            made = fits(ends.problem, ends.outcome, several_, [every[i] for i in here], seed, ends.cost(len(here)))
+            cost = partial(ends.cost, clock, len(here))
+            made = fits(ends.problem, ends.outcome, several_, [every[i] for i in here], seed, cost)
             if plan.conserve_energy:
                 alone = zip(made, several_, here, strict=True)
                 made = [
                     conserving(one, ends.of_material(row), kept, every[i], optimizer, say)
                     for row, (one, kept, i) in enumerate(alone)
                 ]
-            cost = replace(made[0].cost, seconds=(time.perf_counter() - clock) / len(here))
-            for i, one in zip(here, made, strict=True):
-                # a copy of every field of every fit would take longer than a step
-                object.__setattr__(one, "cost", cost)
-                found[i] = one
+                seconds = cost().seconds
+                made = [replace(one, cost=replace(one.cost, seconds=seconds)) for one in made]
+            found.update(zip(here, made, strict=True))
             done += len(here)
             say("done", 1.0, float(ends.outcome.loss.min()))
     return [found[i] for i in range(len(every))]
@@ -67,6 +66,5 @@ def _alike(samples: Samples) -> object:
             "bc.Samples.",
             field="samples",
         )
-    digest = hashlib.sha256(samples.wi.numpy().tobytes())
-    digest.update(samples.wo.numpy().tobytes())
-    return digest.digest(), samples.values.shape, samples.azimuth_observed, samples.sigma is None
+    directions = tuple(hash(each.numpy().tobytes()) for each in (samples.wi, samples.wo))
+    return *directions, samples.values.shape, samples.azimuth_observed, samples.sigma is None

@@ -46,12 +46,15 @@ class Columns:
             values, every = {**start, **leaves}, list(leaves.values())
             bases = [term.model.basis(form.of_term(term, values), g) for term in form.terms]
             reads = [[_reached(basis, every) for basis in each] for each in bases]
-            mixes = [_reached(coefficient, every) for coefficient in self._coefficients(values)]
+            coefficients = self._coefficients(values)
+            mixes = [_reached(coefficient, every) for coefficient in coefficients]
         flat = [found for each in reads for found in each]
         self.bases = len(flat)
         self.wide = any(basis.shape[-1] > 1 for each in bases for basis in each)  # shapes that have colour
         self.derivatives = [(k, p) for k, found in enumerate(flat) for p in found]  # which basis, by which key
         self.coefficient_derivatives = [(k, p) for k, found in enumerate(mixes) for p in found]
+        self._own = [(k, p) for k, c in enumerate(coefficients) for p, leaf in enumerate(every) if c is leaf]
+        self._mixed = [pair for pair in self.coefficient_derivatives if pair not in self._own]
         self.terms = [
             _TermColumns.of(term, [[keys[p] for p in found] for found in each], form.of_term(term, start), g)
             for term, each in zip(form.terms, reads, strict=True)
@@ -97,13 +100,15 @@ class Columns:
     def coefficient_slopes(self, natural: Natural, shape: tuple[int, ...]) -> Tensor:
         """The derivatives of the coefficients by the natural values, (*shape, K, P)."""
         slopes = torch.zeros(*shape, self.bases, len(self.keys), dtype=torch.float64)
-        if not self.coefficient_derivatives:
+        for k, p in self._own:  # the coefficient is the value itself
+            slopes[..., k, p] = 1.0
+        if not self._mixed:
             return slopes
         with torch.enable_grad():
             leaves = [natural[key].detach().expand(shape).requires_grad_() for key in self.keys]
             coefficients = self._coefficients({**natural, **dict(zip(self.keys, leaves, strict=True))})
             for k in range(self.bases):
-                by = [p for j, p in self.coefficient_derivatives if j == k]
+                by = [p for j, p in self._mixed if j == k]
                 if by:
                     found = torch.autograd.grad(
                         coefficients[k].expand(shape).sum(), [leaves[p] for p in by], retain_graph=True

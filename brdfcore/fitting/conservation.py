@@ -18,6 +18,7 @@ others may exist.
 import math
 import time
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import torch
@@ -70,7 +71,7 @@ def conserving(free: Fit, found: Found, kept: Samples, whole: Samples, optimizer
         certificate = _certificate(found)
     made = free
     if fixed or len(directions):
-        (made,) = fits(found.problem, found.outcome, [kept], [whole], seed, found.cost(1))
+        (made,) = fits(found.problem, found.outcome, [kept], [whole], seed, partial(found.cost, begun, 1))
     conservation = Conservation(
         free_objective=free.objective,
         free_max_albedo=free.certificate.max_albedo,

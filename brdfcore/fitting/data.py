@@ -11,7 +11,7 @@ from ..geometry import Geometry, geometry
 from .losses import Loss, Scales
 
 Rows = slice
-_CHUNK = 32768  # samples times starts of one piece: what a basis computes on the way stays in the cache
+_CHUNK = 65536  # samples times starts of one piece: what a basis computes on the way stays in the cache
 _FEWEST = 8  # starts of one piece, where there are as many: they share what the directions decide
 
 

@@ -59,14 +59,14 @@ def levenberg_marquardt(
     evaluate: Evaluate,
     x: Tensor,
     floor: Tensor,
-    tolerance: float = DECREMENT,
+    tolerance: float | Tensor = DECREMENT,
     max_iterations: int = 200,
     on_step: OnStep | None = None,
     known: Gram | None = None,
 ) -> Outcome:
     """The optimum that each row x (S, D) leads to; a loss below the floor (S,) is rounding.
 
-    `known` are the equations at x, where `evaluate` has been there.
+    The tolerance is one for all rows, or one a row. `known` are the equations at x, where `evaluate` has been there.
     """
     if known is None:
         x, known = evaluate(x.clamp(problem.low, problem.high), torch.arange(len(x)))
@@ -75,13 +75,14 @@ def levenberg_marquardt(
     growth = torch.full_like(damping, 2.0)
     converged = torch.zeros(len(x), dtype=torch.bool)
     active = torch.arange(len(x))
+    enough = torch.as_tensor(tolerance, dtype=torch.float64).expand(len(x))
     done = 0
     for done in range(1, max_iterations + 1):
         here, old, eager, least = gram.pick(active), x[active], damping[active], floor[active]
         held = problem.held(old, here.gradient)
         undamped, step = solve_free(here, held, torch.stack([torch.zeros_like(eager), eager]))
-        enough = tolerance * here.loss + 0.01 * least
-        ended = (decrement(here, undamped) <= enough) | (here.loss <= least)
+        gain = decrement(here, undamped)
+        ended = (gain <= enough[active] * here.loss + 0.01 * least) | (here.loss <= least)
         converged[active] = ended
         going = ~ended & (eager <= _LAMBDA_LIMIT)
         if not bool(going.all()):

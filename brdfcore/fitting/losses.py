@@ -11,6 +11,7 @@ channels. All are sums of squares. root(x) = (x + e)^(1/3) - e^(1/3) with e = 1 
 bounds the root's slope at zero. A negative y counts as 0 in log, in cube_root and in the denominator of relative.
 """
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,26 +19,41 @@ import torch
 from torch import Tensor
 
 
-@dataclass(frozen=True)
 class Scales:
-    """Magnitudes of the data that some losses need [1/sr], one number or one a material."""
+    """Magnitudes of the data that some losses need [1/sr], one number or one a material, made when first read."""
 
-    y: float | Tensor  # median positive value
-    cy: float | Tensor  # median positive value times the cosine
+    def __init__(self, y: Callable[[], float | Tensor], cy: Callable[[], float | Tensor]) -> None:
+        self._make_y, self._make_cy = y, cy
+
+    @functools.cached_property
+    def y(self) -> float | Tensor:
+        """The median positive value."""
+        return self._make_y()
+
+    @functools.cached_property
+    def cy(self) -> float | Tensor:
+        """The median positive value times the cosine."""
+        return self._make_cy()
 
     @classmethod
     def of(cls, y: Tensor, c: Tensor) -> "Scales":
         """The scales of values y (N, C) and cosines c (N, 1); 1 where no value is positive."""
-        return cls(float(_median(y.flatten())), float(_median((c * y).flatten())))
+        return cls(lambda: float(_median(y.flatten())), lambda: float(_median((c * y).flatten())))
 
     @classmethod
     def stacked(cls, y: Tensor, c: Tensor) -> "Scales":
         """The scales, each (M, 1, 1), of the values y (M, C, N) of several materials and cosines c (N,)."""
-        return cls(*(_median(each.flatten(1)).reshape(-1, 1, 1) for each in (y, c * y)))
+        return cls(
+            lambda: _median(y.flatten(1)).reshape(-1, 1, 1), lambda: _median((c * y).flatten(1)).reshape(-1, 1, 1)
+        )
 
     def rows(self, index: Tensor) -> "Scales":
         """The scales of the materials that the index names."""
-        return Scales(*(s[index] if isinstance(s, Tensor) else s for s in (self.y, self.cy)))
+
+        def chosen(scale: float | Tensor) -> float | Tensor:
+            return scale[index] if isinstance(scale, Tensor) else scale
+
+        return Scales(lambda: chosen(self.y), lambda: chosen(self.cy))
 
 
 def _median(x: Tensor) -> Tensor:

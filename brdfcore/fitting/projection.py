@@ -17,7 +17,7 @@ from torch import Tensor
 
 from ..parameters import Values
 from .problem import Gram, Problem, linear_factor, rows_of
-from .solve import MOST, Block, Faces, solve_box, solve_faces
+from .solve import MOST, Block, Faces, dot, solve_box, solve_faces, times
 from .unknowns import Group, groups, natural_of
 
 
@@ -27,6 +27,11 @@ class Products(NamedTuple):
     columns: Tensor  # (..., W, Q, Q)
     data: Tensor  # (..., C, Q)
     squares: Tensor  # (..., C)
+
+    def pick(self, *index: Tensor) -> "Products":
+        """Those at an index of the leading shape (...), to which all broadcast."""
+        lead = torch.broadcast_tensors(self.columns[..., 0, 0, 0], self.data[..., 0, 0])[0].shape
+        return Products(*(part.expand(*lead, *part.shape[len(lead) :])[index] for part in self))
 
 
 class Affine(NamedTuple):
@@ -122,12 +127,28 @@ class Projection:
 
     def affine(self, x: Tensor, natural: Values, *, slopes: bool = True) -> Affine:
         """The coefficients as functions of the unknowns at the shapes of x (S, D), and its natural values."""
+        if self._shaped:
+            return self._affine(x, natural, slopes=slopes)
+        return Affine(*(part.expand(len(x), *part.shape[1:]) for part in self._same))
+
+    @functools.cached_property
+    def _shaped(self) -> bool:
+        """Whether coefficients read what is searched; else they are the same in all rows."""
+        return any(p in self.shapes for _, p in self.problem.columns.coefficient_derivatives)
+
+    @functools.cached_property
+    def _same(self) -> Affine:
+        """The coefficients of one row."""
+        x = self.problem.pack(self.problem.plan.start).unsqueeze(0)
+        return self._affine(x, self.problem.natural(x), slopes=False)
+
+    def _affine(self, x: Tensor, natural: Values, *, slopes: bool) -> Affine:
         problem = self.problem
         shape = (self.count + 1, len(x), 1, problem.channels)
         values = {**natural, **self._corners}
         c = problem.columns.coefficients(values, shape).squeeze(2)  # (L + 1, S, C, K)
         names = len(problem.keys)
-        if slopes and any(p in self.shapes for _, p in problem.columns.coefficient_derivatives):
+        if slopes and self._shaped:
             d = problem.columns.coefficient_slopes(values, shape).squeeze(2) * problem.chain(x).unsqueeze(-2)
         else:
             d = c.new_zeros(1, 1, 1, 1, names).expand(*c.shape, names)
@@ -192,14 +213,17 @@ class Projection:
         gram, right = _summed(parts)
         return Products(gram, right, squares.unsqueeze(0))
 
-    def solve(self, products: Products, offset: Tensor, a: Tensor) -> Solved:
-        """The unknowns and the loss for products of leading shape (...) and coefficients offset + A z."""
+    def solve(self, products: Products, offset: Tensor, a: Tensor, *, ends: bool = True) -> Solved:
+        """The unknowns and the loss for products of leading shape (...) and coefficients offset + A z.
+
+        Where there are faces, the unknowns may also be solved for without the ends of their polytope.
+        """
         bases = self.problem.columns.bases
         g = products.columns[..., :bases, :bases]
         right = products.data[..., :bases]
         gz = a.mT @ g @ a  # (..., C, L, L)
-        g_offset = (g @ offset.unsqueeze(-1)).squeeze(-1)
-        rz = (a.mT @ (right - g_offset).unsqueeze(-1)).squeeze(-1)
+        g_offset = times(g, offset)
+        rz = times(a.mT, right - g_offset)
         lead = rz.shape[:-2]
         channels = self.problem.channels
         gz = gz.expand(*lead, channels, self.count, self.count)
@@ -214,15 +238,20 @@ class Projection:
             else:
                 gz_, rz_ = gz, rz
             if self.faces is None:
-                ends = (end[self.place[: gz_.shape[-3]]] for end in (self.low, self.high))
-                z, free = solve_box(gz_, rz_, *ends)
+                low, high = (end[self.place[: gz_.shape[-3]]] for end in (self.low, self.high))
+                z, free = solve_box(gz_, rz_, low, high)
                 directions = torch.diag_embed(free.to(z))
             else:
-                z, directions = solve_faces(self.faces, gz_, rz_)
+                z, directions = solve_faces(self.faces, gz_, rz_, ends=ends)
             z = z.expand(*lead, channels, self.count)
-        fixed = (offset * (g_offset - 2 * right)).sum(-1)
-        loss = products.squares + fixed + (z * ((gz @ z.unsqueeze(-1)).squeeze(-1) - 2 * rz)).sum(-1)
+        loss = products.squares + dot(offset, g_offset - 2 * right) + dot(z, times(gz, z) - 2 * rz)
         return Solved(z, directions, loss.sum(-1))
+
+    def outside(self, z: Tensor) -> Tensor:
+        """Where the unknowns z (..., C, L), solved for without their ends, lie outside the polytope, (...) bool."""
+        if self.faces is None:
+            return torch.zeros(z.shape[:-2], dtype=torch.bool)
+        return self.faces.outside(z).any(-1)
 
     def scatter(self, gram: Tensor, right: Tensor) -> tuple[Tensor, Tensor]:
         """Systems by channel (B, C, L, L), (B, C, L) summed into the dense one (B, D, D), (B, D)."""

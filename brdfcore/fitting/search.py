@@ -5,6 +5,7 @@ solutions of the cosine loss join the starts of Levenberg-Marquardt on all value
 whatever came before: it keeps every end of the box, and computes residuals one by one, so that none cancel.
 """
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,7 @@ from ..formats.samples import Samples
 from .adam import adam
 from .lbfgs import lbfgs
 from .least_squares import least_squares
-from .levenberg_marquardt import OnStep, Outcome
+from .levenberg_marquardt import DECREMENT, OnStep, Outcome
 from .losses import LOSSES
 from .plan import Plan
 from .problem import Problem
@@ -57,9 +58,10 @@ class Found:
         alone = Problem(whole.plan, [], whole.loss_kind, robust_scale=scale, data=whole.data.rows(which))
         return replace(self, problem=alone, outcome=self.outcome.pick(which))
 
-    def cost(self, materials: int) -> Cost:
-        """What each of so many materials cost but for the time, which ends later; uncertainty evaluates once more."""
-        return Cost(0.0, self.evaluations // materials + 1, self.iterations, self.starts, self.optimizer)
+    def cost(self, begun: float, materials: int) -> Cost:
+        """What each of so many materials cost since then, by the clock; uncertainty evaluates once more."""
+        seconds = (time.perf_counter() - begun) / materials
+        return Cost(seconds, self.evaluations // materials + 1, self.iterations, self.starts, self.optimizer)
 
 
 def search(plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, seed: int, say: Say) -> Found:
@@ -142,7 +144,9 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
         if not several_lobes(projection):
             hopeful = shares.reshape(-1) <= _HOPELESS
             x, which = x[hopeful], which[hopeful]
-        best, iterations = _raced(projection, x, which, tell)
+        lone = torch.bincount(which, minlength=materials)[which] == 1  # without a rival: runs to its end at once
+        ends = torch.where(lone, DECREMENT, _RACE) if whole is coarse else _RACE
+        best, iterations = _raced(projection, x, which, tell, ends)
         if several_lobes(projection):
             again = torch.cat([best.x.unsqueeze(1), rescan(projection, best.x, _AGAIN, seed)], dim=1)
             which = torch.arange(materials).repeat_interleave(again.shape[1])
@@ -177,9 +181,11 @@ def _race(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: st
     return Found(whole, best, each, sum(seen.values()), iterations, name)
 
 
-def _raced(projection: Projection, x: Tensor, which: Tensor, tell: OnStep) -> tuple[Outcome, int]:
+def _raced(
+    projection: Projection, x: Tensor, which: Tensor, tell: OnStep, tolerance: float | Tensor = _RACE
+) -> tuple[Outcome, int]:
     """Where the best of each material's starts x (S, D) ends, and the iterations that took."""
-    outcome = raced = variable_projection(projection, x, which, _RACE, on_step=tell)
+    outcome = raced = variable_projection(projection, x, which, tolerance, on_step=tell)
     if projection.may_leave_the_box:
         outcome = least_squares(projection.problem, raced.x, which, on_step=tell)
     return outcome.pick(_best(outcome.loss, which, projection.problem.materials)), raced.iterations

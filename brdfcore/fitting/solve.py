@@ -8,7 +8,7 @@ its upper end, all of them. More unknowns, or gray ones beside coloured ones, ar
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -54,6 +54,7 @@ class Faces:
     origin: Tensor  # (F, C, L)
     directions: Tensor  # (F, L, L), 0 in the columns of what the face holds
     lower: int  # how many of the first faces touch no upper end
+    along_axes: bool  # every face: no triangle's slanted edge is among them
 
     @classmethod
     def of(cls, blocks: tuple[Block, ...]) -> "Faces":
@@ -70,12 +71,17 @@ class Faces:
             made.append((any(upper for upper, _, _ in choice), origin, directions))
         made.sort(key=lambda face: face[0])
         lower = sum(not upper for upper, _, _ in made)
-        return cls(blocks, torch.stack([o for _, o, _ in made]), torch.stack([d for _, _, d in made]), lower)
+        straight = all(len(block.at) == 1 for block in blocks)
+        return cls(blocks, torch.stack([o for _, o, _ in made]), torch.stack([d for _, _, d in made]), lower, straight)
 
     def channels(self, channel: Tensor) -> "Faces":
         """The same of chosen channels (P,), again and again where they repeat."""
         blocks = tuple(Block(block.at, block.low[channel], block.high[channel]) for block in self.blocks)
-        return Faces(blocks, self.origin[:, channel], self.directions, self.lower)
+        return replace(self, blocks=blocks, origin=self.origin[:, channel])
+
+    def outside(self, z: Tensor) -> Tensor:
+        """Where z (..., C, L) lies outside the polytope, (..., C)."""
+        return self.below(z) | self.beyond(z)
 
     def below(self, z: Tensor) -> Tensor:
         """Where z (..., C, L) leaves the polytope through its lower ends, (..., C)."""
@@ -94,14 +100,19 @@ class Faces:
         return out
 
 
-def solve_faces(faces: Faces, gram: Tensor, right: Tensor) -> tuple[Tensor, Tensor]:
-    """The minimum z (..., C, L) and the directions (..., C, L, L) of its face, for G (..., C, L, L), r (..., C, L)."""
+def solve_faces(faces: Faces, gram: Tensor, right: Tensor, *, ends: bool = True) -> tuple[Tensor, Tensor]:
+    """The minimum z (..., C, L) and the directions (..., C, L, L) of its face, for G (..., C, L, L), r (..., C, L).
+
+    Without the polytope's ends it is that of all space, whose value none in the polytope is below.
+    """
     shape = torch.broadcast_tensors(gram[..., 0], right)[0].shape  # broadcast_shapes would import half of torch
     channels, count = shape[-2:]
     gram = gram.expand(*shape, count).reshape(-1, channels, count, count)
     right = right.expand(shape).reshape(-1, channels, count)
-    z, face = _best(faces, 1, gram, right)
-    for leaves, among in ((faces.below, faces.lower), (faces.beyond, len(faces.origin))):
+    inside = faces.origin[0]  # of the first face, on which every unknown is free
+    z = inside + solve_definite(gram, right - times(gram, inside))
+    face = torch.zeros(z.shape[:-1], dtype=torch.long)
+    for leaves, among in ((faces.below, faces.lower), (faces.beyond, len(faces.origin))) if ends else ():
         row, channel = leaves(z).nonzero(as_tuple=True)
         if len(row):
             systems = gram[row, channel].unsqueeze(0), right[row, channel].unsqueeze(0)
@@ -115,23 +126,41 @@ def _best(faces: Faces, among: int, gram: Tensor, right: Tensor) -> tuple[Tensor
     start = faces.origin[:among].unsqueeze(0)  # (1, F, C, L)
     d = faces.directions[:among].unsqueeze(1)  # (F, 1, L, L)
     g, r = gram.unsqueeze(1), right.unsqueeze(1)  # (B, 1, C, L, L), (B, 1, C, L)
-    slope = r - (g * start.unsqueeze(-2)).sum(-1) if bool(start.any()) else r
-    if among > faces.lower:
-        system, wanted = d.mT @ g @ d, (d.mT @ slope.unsqueeze(-1)).squeeze(-1)
-        t = solve_definite(system, wanted)
-        z = start + (d @ t.unsqueeze(-1)).squeeze(-1)  # (B, F, C, L)
-        wrong = faces.below(z) | faces.beyond(z)
-    else:  # along axes: no products of tiny matrices
+    offset = bool(start.any())
+    slope = r - times(g, start) if offset else r
+    if faces.along_axes or among <= faces.lower:  # no products of tiny matrices, which cost a call each
         e = d.diagonal(dim1=-2, dim2=-1)
         system, wanted = g * e.unsqueeze(-1) * e.unsqueeze(-2), slope * e
+        t = step = solve_definite(system, wanted)
+    else:
+        system, wanted = d.mT @ g @ d, times(d.mT, slope)
         t = solve_definite(system, wanted)
-        z = start + t
-        wrong = faces.below(z)
-    if among == 1:
-        return z[:, 0], torch.zeros(z[:, 0, :, 0].shape, dtype=torch.long)
-    value = -(t * wanted).sum(-1) - (start * (slope + r)).sum(-1)
-    face = torch.where(wrong, torch.inf, value).argmin(1)  # (B, C)
+        step = times(d, t)
+    z = start + step  # (B, F, C, L)
+    wrong = faces.below(z)
+    value = -dot(t, wanted)
+    if offset:
+        value -= dot(start, slope + r)
+    if among > faces.lower:
+        wrong |= faces.beyond(z)
+    face = value.masked_fill_(wrong, torch.inf).argmin(1)  # (B, C)
     return z.gather(1, face[:, None, :, None].expand(-1, 1, -1, z.shape[-1])).squeeze(1), face
+
+
+def dot(a: Tensor, b: Tensor) -> Tensor:
+    """The sums of a b over a last dimension of few (..., L), (...), by element: a reduction over few is slow."""
+    total = a[..., 0] * b[..., 0]
+    for i in range(1, a.shape[-1]):
+        total = torch.addcmul(total, a[..., i], b[..., i])
+    return total
+
+
+def times(matrix: Tensor, vector: Tensor) -> Tensor:
+    """The products (..., K) of small matrices (..., K, L) and vectors (..., L), by element as well."""
+    total = matrix[..., 0] * vector[..., :1]
+    for i in range(1, matrix.shape[-1]):
+        total = torch.addcmul(total, matrix[..., i], vector[..., i : i + 1])
+    return total
 
 
 def solve_definite(matrix: Tensor, right: Tensor) -> Tensor:
@@ -141,11 +170,12 @@ def solve_definite(matrix: Tensor, right: Tensor) -> Tensor:
     LAPACK would be called for each.
     """
     count = matrix.shape[-1]
-    diagonal = [matrix[..., i, i] for i in range(count)]
-    scale = [torch.where(x > 0, x.clamp(min=1e-300).rsqrt(), 0.0) for x in diagonal]
+    diagonal = matrix.diagonal(dim1=-2, dim2=-1)
+    seen = diagonal > 0
+    scaling = torch.where(seen, diagonal.clamp(min=1e-300).rsqrt(), 0.0)
+    scale, d = list(scaling.unbind(-1)), list(torch.where(seen, 1 + _RIDGE, 1.0).unbind(-1))
+    b = list((right * scaling).unbind(-1))
     m = [[matrix[..., i, j] * scale[i] * scale[j] for j in range(i)] for i in range(count)]
-    d = [torch.where(x > 0, 1 + _RIDGE, 1.0) for x in diagonal]
-    b = [right[..., i] * scale[i] for i in range(count)]
     for j in range(count):
         pivot = d[j].clamp(min=_RIDGE)
         for i in range(j + 1, count):
@@ -158,7 +188,7 @@ def solve_definite(matrix: Tensor, right: Tensor) -> Tensor:
         for k in range(i + 1, count):
             b[i] = b[i] - m[k][i] * b[k]
         b[i] = b[i] / d[i].clamp(min=_RIDGE)
-    return torch.stack([scale[i] * b[i] for i in range(count)], dim=-1)
+    return torch.stack(b, dim=-1) * scaling
 
 
 def solve_box(gram: Tensor, right: Tensor, low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:

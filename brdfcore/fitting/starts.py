@@ -30,21 +30,23 @@ def scan(problem: Problem, projection: Projection, count: int, seed: int) -> tup
     own = [problem.pack(values) for values in problem.plan.starts]
     given = torch.stack(own) if own else torch.zeros(0, problem.size, dtype=torch.float64)
     points = _points(problem, projection, seed)
+    starts, shares = [given.expand(materials, -1, -1)], [torch.ones(materials, len(given), dtype=torch.float64)]
     solved = points.expand(materials, -1, -1)
-    best: list[Tensor] = []
-    shares = [torch.ones(materials, len(given), dtype=torch.float64)]
+    linear = projection.useful and projection.problem is problem
     if projection.useful:
-        solved, loss = _solved(projection, points)
-        best.append(loss.argsort(dim=1)[:, :count])
-        shares.append(_shares(loss.gather(1, best[-1])))
-    if not projection.useful or projection.problem is not problem:
-        which = torch.arange(materials).repeat_interleave(solved.shape[1])
+        z, loss = _solved(projection, points, count if linear else len(points))
+        least = loss.topk(min(count, len(points)), dim=1, largest=False)
+        starts.append(_written(projection, points, z, least.indices))
+        shares.append(_shares(least.values))
+        if not linear:
+            solved = _written(projection, points, z, torch.arange(len(points)).expand(materials, -1))
+    if not linear:
+        which = torch.arange(materials).repeat_interleave(len(points))
         loss = problem.loss(solved.reshape(-1, problem.size), which).reshape(materials, -1)
-        best.append(torch.where(loss.isfinite(), loss, torch.inf).argsort(dim=1)[:, :count])
-        shares.append(_shares(loss.gather(1, best[-1])))
-    index = torch.cat(best, dim=1).unsqueeze(-1).expand(-1, -1, problem.size)
-    starts = torch.cat([given.expand(materials, -1, -1), solved.gather(1, index)], dim=1)
-    return starts, torch.cat(shares, dim=1)
+        least = torch.where(loss.isfinite(), loss, torch.inf).topk(min(count, len(points)), dim=1, largest=False)
+        starts.append(solved.gather(1, least.indices.unsqueeze(-1).expand(-1, -1, problem.size)))
+        shares.append(_shares(least.values))
+    return torch.cat(starts, dim=1), torch.cat(shares, dim=1)
 
 
 def _shares(loss: Tensor) -> Tensor:
@@ -113,18 +115,35 @@ def _drawn(problem: Problem, shapes: list[str], count: int, seed: int) -> Tensor
     return points.clamp(problem.low, problem.high)
 
 
-def _solved(projection: Projection, points: Tensor) -> tuple[Tensor, Tensor]:
-    """The points with their unknowns solved for, (M, S, D), and the projection's losses (M, S)."""
-    rows: list[Tensor] = []
-    losses: list[Tensor] = []
+def _solved(projection: Projection, points: Tensor, count: int) -> tuple[Tensor, Tensor]:
+    """The unknowns (M, S, C, L) at the points and the losses (M, S), as far as the best `count` a material need them.
+
+    Elsewhere they are those of the unknowns without their ends, below which none in the polytope is.
+    """
+    parts: list[tuple[Tensor, Tensor]] = []
     for x in points.split(_AT_ONCE):
         natural = projection.problem.natural(x)
         affine = projection.affine(x, natural, slopes=False)
-        products = projection.scan_products(len(x), natural)
-        found = projection.solve(products, affine.offset.unsqueeze(1), affine.a.unsqueeze(1))
-        materials = found.loss.shape[1]
-        each = x.repeat_interleave(materials, 0)
-        written = projection.write(each, projection.problem.natural(each), found.z.flatten(0, 1))
-        rows.append(written.reshape(len(x), materials, -1))
-        losses.append(found.loss)
-    return torch.cat(rows).transpose(0, 1), torch.cat(losses).T
+        products, offset, a = (
+            projection.scan_products(len(x), natural),
+            affine.offset.unsqueeze(1),
+            affine.a.unsqueeze(1),
+        )
+        found = projection.solve(products, offset, a, ends=False)
+        z, loss = found.z, found.loss
+        outside = projection.outside(z)
+        enough = torch.where(outside, torch.inf, loss).kthvalue(min(count, len(x)), dim=0).values
+        at = (outside & (loss < enough)).nonzero(as_tuple=True)
+        if len(at[0]):
+            again = projection.solve(products.pick(*at), affine.offset[at[0]], affine.a[at[0]])
+            z, loss = z.index_put(at, again.z), loss.index_put(at, again.loss)
+        parts.append((z, loss))
+    z, loss = (torch.cat(each) for each in zip(*parts, strict=True))
+    return z.transpose(0, 1), loss.T
+
+
+def _written(projection: Projection, points: Tensor, z: Tensor, index: Tensor) -> Tensor:
+    """The points (S, D) that an index (M, n) names with their unknowns, of z (M, S, C, L), in them: (M, n, D)."""
+    x = points[index].flatten(0, 1)
+    own = z.gather(1, index[..., None, None].expand(-1, -1, *z.shape[2:])).flatten(0, 1)
+    return projection.write(x, projection.problem.natural(x), own).reshape(*index.shape, -1)

@@ -75,20 +75,21 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     suspect = is_suspect(matrix, sums.level, spectrum, lengths) | (loose | (blind & ~held)).any(-1)
     nothing = Unseen.nothing(problem.size)
     found = [nothing] * len(x)
+    undetermined = torch.zeros_like(held)
+    kept, over_range = (each.expand(len(x), -1, -1).clone() for each in nothing.kept(lengths))
+    freedom = counted.clone()
     for row in suspect.nonzero()[:, 0].tolist():
         parts = (blind[row], lengths, magnitudes(problem, x)[row])
         one = unseen(matrix[row], sums.level[row], ~held[row] | loose[row], *parts)
         released = loose[row] & one.taking_part.any(0)
         if bool((loose[row] & ~released).any()):
             one = unseen(matrix[row], sums.level[row], ~held[row] | released, *parts)
-        held[row] &= ~(released & one.taking_part.any(0))
+        undetermined[row] = one.taking_part.any(0)
+        held[row] &= ~(released & undetermined[row])
         found[row] = one
-    undetermined = torch.stack([one.taking_part.any(0) for one in found])
-    free_directions = torch.tensor([len(one.directions) for one in found])
-    freedom = counted - (~held).sum(-1) + free_directions
-    keeps_all = nothing.kept(lengths)
-    parts_kept = [keeps_all if one is nothing else one.kept(lengths) for one in found]
-    kept, over_range = (torch.stack(each) for each in zip(*parts_kept, strict=True))
+        kept[row], over_range[row] = one.kept(lengths)
+        freedom[row] += len(one.directions)
+    freedom -= (~held).sum(-1)
     unknown, degrees = sums.unknown, sums.freedom
     if bool(suspect.any()):
         spectrum = Spectrum.of(matrix, ~held & ~blind)

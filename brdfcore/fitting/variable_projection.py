@@ -13,7 +13,7 @@ def variable_projection(
     projection: Projection,
     x: Tensor,
     which: Tensor | None = None,
-    tolerance: float = DECREMENT,
+    tolerance: float | Tensor = DECREMENT,
     max_iterations: int = 100,
     on_step: OnStep | None = None,
     known: Gram | None = None,

@@ -1,7 +1,7 @@
 """What optima are worth: values with intervals, errors under every loss, and sentences, for all materials at once."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import torch
 from torch import Tensor
@@ -19,9 +19,17 @@ from .uncertainty import Uncertainty, uncertainty
 
 
 def fits(
-    problem: Problem, outcome: Outcome, fitted: Sequence[Samples], given: Sequence[Samples], seed: int, cost: Cost
+    problem: Problem,
+    outcome: Outcome,
+    fitted: Sequence[Samples],
+    given: Sequence[Samples],
+    seed: int,
+    cost: Callable[[], Cost],
 ) -> list[Fit]:
-    """What each material's optimum is worth; `given` are the samples before any were left out."""
+    """What each material's optimum is worth; `given` are the samples before any were left out.
+
+    The cost of each is asked for when all but their writing down is done.
+    """
     plan, x, channels = problem.plan, outcome.x, fitted[0].channels
     weighed = problem.loss_kind.statistical and fitted[0].sigma is not None and fitted[0].weight is None
     known = uncertainty(problem, x, outcome.gram)
@@ -38,10 +46,10 @@ def fits(
     typical = torch.as_tensor(problem.data.scales.y, dtype=torch.float64).reshape(-1)
     told = warnings(plan, supports(fitted[0]), problem.data.y, typical, problem.loss_kind.name)
     names = [name_of(problem, at, channels) for at in range(problem.size)]
-    covariances = _certain(known.covariance)
+    covariances = _certain(known.covariance, names)
     of_row = {key: value.reshape(len(x), *plan.start[key].shape).unbind() for key, value in values.items()}
     held, vague = known.held.tolist(), known.vague.tolist()
-    found = []
+    found, spent = [], cost()
     for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
         parameters, standard_errors, intervals = described[row]
         undetermined, combinations = named(problem, known.unseen[row], known.chain[row], channels)
@@ -58,7 +66,7 @@ def fits(
                 combinations=combinations,
                 singular_values=known.singular_values[row],
                 covariance=covariances[row][0],
-                covariance_keys=tuple(names[at] for at in covariances[row][1]),
+                covariance_keys=covariances[row][1],
                 loss=problem.loss_kind.name,
                 objective=objectives[row],
                 weighed=weighed,
@@ -72,7 +80,7 @@ def fits(
                 gray=tuple(sorted(plan.gray)),
                 per_channel=tuple(sorted(plan.per_channel)),
                 chi_square=None if chi_square is None else (chi_square[row], freedom[row]),
-                cost=cost,
+                cost=spent,
                 channels=samples.channels,
                 provenance={"version": __version__, "torch": torch.__version__, "seed": seed, "input": whole.hash},
             )
@@ -80,12 +88,17 @@ def fits(
     return found
 
 
-def _certain(covariance: Tensor) -> list[tuple[Tensor, list[int]]]:
-    """Of each covariance (M, D, D) what has a standard error, (K, K), and its positions."""
-    found: list[tuple[Tensor, list[int]]] = []
-    for whole, certain in zip(covariance, covariance.diagonal(dim1=-2, dim2=-1).isfinite().tolist(), strict=True):
-        kept = [at for at, one in enumerate(certain) if one]
-        found.append((whole.clone() if all(certain) else whole[kept][:, kept], kept))
+def _certain(covariance: Tensor, names: Sequence[str]) -> list[tuple[Tensor, tuple[str, ...]]]:
+    """Of each covariance (M, D, D) what has a standard error, (K, K), and its names."""
+    found: list[tuple[Tensor, tuple[str, ...]]] = []
+    all_names = tuple(names)
+    rows = zip(covariance.unbind(), covariance.diagonal(dim1=-2, dim2=-1).isfinite().tolist(), strict=True)
+    for whole, certain in rows:
+        if all(certain):
+            found.append((whole.clone(), all_names))
+        else:
+            kept = [at for at, one in enumerate(certain) if one]
+            found.append((whole[kept][:, kept], tuple(names[at] for at in kept)))
     return found
 
 
