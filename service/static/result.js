@@ -62,6 +62,7 @@ function energy(certificate) {
   return certificate.energy_conserving ? made("span", { class: "good" }, "conserves") : made("span", { class: "bad" }, "creates");
 }
 
+/** @type {Record<string, string>} */
 const ENDS = { converged: "Converged. ", undetermined: "Converged, with values left free. ", stopped_early: "Stopped early. " };
 
 function detail() {

@@ -144,7 +144,7 @@ def test_from_the_example_to_a_fit_again_by_keyboard_and_mouse(page: Any, url: s
     assert "<svg" in pathlib.Path(download.value.path()).read_text()
     with page.expect_download() as download:
         page.get_by_role("button", name="residuals SVG").click()
-    assert pathlib.Path(download.value.path()).read_text().startswith("<svg")
+    assert "<svg" in pathlib.Path(download.value.path()).read_text()
     expect(page, "#taking").to_contain_text('client.fit("FILE", model="lambert + ward_bounded")')
 
     page.click("#again")
