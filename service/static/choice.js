@@ -57,7 +57,8 @@ export function offerAuto() {
 
 function filter() {
   const wanted = at("find-model").value.trim().toLowerCase();
-  for (const label of at("lobes").querySelectorAll("label")) label.hidden = !label.textContent.toLowerCase().includes(wanted);
+  for (const label of at("lobes").querySelectorAll("label")) // what will be fitted stays in sight
+    label.hidden = !label.textContent.toLowerCase().includes(wanted) && !label.querySelector("input").checked;
 }
 
 /** @returns {string[]} the models' texts, each once */

@@ -46,6 +46,12 @@ export function table(caption, titles, rows) {
   );
 }
 
+/** A material's text that may be broken where its options begin, too. @param {string} text @returns {HTMLElement} */
+export function breakable(text) {
+  const [first, ...rest] = text.split("(");
+  return made("span", {}, first, ...rest.flatMap((part) => ["(", made("wbr"), part]));
+}
+
 /** @type {Map<string, Map<string, string>>} what stands where, and from where it came */
 const complaints = new Map();
 

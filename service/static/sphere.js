@@ -2,7 +2,7 @@
 
 import { once } from "./answers.js";
 import { ask } from "./api.js";
-import { at, complain, made } from "./dom.js";
+import { at, breakable, complain, made } from "./dom.js";
 import { SERIES } from "./figures.js";
 import { latest } from "./latest.js";
 import { byHand, choose, chosen, on, ranked, state, valuesOf } from "./state.js";
@@ -28,7 +28,7 @@ async function drawAll(signal) {
   for (const id of cards.keys()) if (!fits.some((fit) => fit.id === id)) cards.delete(id);
   const wanted = fits.map((fit, rank) => {
     const { item, name } = cards.get(fit.id) ?? card(fit);
-    name.replaceChildren(made("span", { class: `swatch swatch-${rank % SERIES}` }), `${rank + 1}. ${fit.result.model}`);
+    name.replaceChildren(made("span", { class: `swatch swatch-${rank % SERIES}` }), `${rank + 1}. `, breakable(fit.result.model));
     item.firstElementChild?.setAttribute("aria-pressed", String(fit.id === state.chosen));
     return item;
   });

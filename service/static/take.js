@@ -36,24 +36,27 @@ function show() {
   const address = made("a", { href: link, id: "permalink" }, link);
   const figures = ["lobes", "albedo", "residuals"].flatMap((name) => ["svg", "png"].map((kind) => button(`${name} ${kind.toUpperCase()}`, () => plot(fit, name, kind))));
   at("taking").replaceChildren(
-    made("div", { class: "row" },
-      made("b", {}, "Files"),
+    taken("Files",
       button("Report", async () => save(new Blob([fit.result.report], { type: "text/plain" }), `${fit.id}.txt`)),
       button("Result as JSON", async () => save(new Blob([JSON.stringify(fit.result, null, 2)], { type: "application/json" }), `${fit.id}.json`)),
       ...formats.map((format) => offered(fit, format)),
     ),
-    ...(drawable(fit) ? [] : [made("p", { class: "hint" }, `The files of other programs hold one channel, or red, green and blue; this material has ${fit.result.channels.length}.`)]),
-    made("div", { class: "row" },
-      made("b", {}, "Figures"), ...figures,
+    ...(drawable(fit) ? [] : [taken("", made("p", { class: "hint" }, `The files of other programs hold one channel, or red, green and blue; this material has ${fit.result.channels.length}.`))]),
+    taken("Figures", ...figures,
       button("lobe in space PNG", async () => save(await picture(await lobeOf(fit)), `${fit.id}_lobe.png`)),
       button("sphere PNG", async () => save(await pictured(fit, fit.result.material.values), `${fit.id}_sphere.png`)),
     ),
     made("p", { class: "hint", id: "as-it-was", hidden: state.values === null }, "All of this is of the fit as it was fitted. What you change by hand is in it once you fit again from there."),
-    made("div", { class: "row" }, made("b", {}, "Link"), address, copy("Copy the link", address)),
+    taken("Link", address, copy("Copy the link", address)),
     made("div", { class: "pair" }, code("Python", python(fit)), code("curl", curl(fit))),
     made("p", { class: "hint" }, `${fit.request.dataset === null ? "SAMPLES stands for the samples, as the request held them" : "FILE stands for the measured file"}${hasKey() ? ", KEY for the key" : ""}.`),
     made("p", { class: "hint", role: "status", id: "copied" }),
   );
+}
+
+/** @param {string} title @param {...Node} things */
+function taken(title, ...things) {
+  return made("div", { class: "taken" }, made("b", {}, title), made("div", { class: "row" }, ...things));
 }
 
 /** @param {string} text @param {() => Promise<void>} action */
