@@ -84,7 +84,7 @@ export async function get(path, options = {}) {
  * A fit that has ended, after every event of it on the way; what is lost on the way is told, and asked for again.
  * @param {string} id
  * @param {(event: any) => void} hear
- * @param {(error: unknown) => void} lost
+ * @param {(error: unknown) => void} lost is told why nothing is heard, and null once it is heard again
  * @param {AbortSignal} signal
  * @returns {Promise<any>}
  */
@@ -96,6 +96,7 @@ export async function followed(id, hear, lost, signal) {
       if (over) return await get(`/v1/fits/${id}`, { signal });
       const headers = { accept: "text/event-stream", ...(last ? { "last-event-id": last } : {}) };
       const answer = await ask(`/v1/fits/${id}/events`, { headers, signal });
+      lost(null);
       for await (const event of events(/** @type {ReadableStream} */ (answer.body))) {
         signal.throwIfAborted();
         last = event.id || last;

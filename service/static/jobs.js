@@ -94,36 +94,42 @@ function row(fit) {
   const svg = sparkline(name);
   const cancel = made("button", { type: "button", class: "small", "aria-label": `Cancel ${name}` }, "Cancel");
   const failure = made("p", { class: "error", role: "alert", hidden: true });
-  const fail = (/** @type {string | null} */ text) => {
-    failure.hidden = !text;
-    failure.textContent = text ?? "";
+  /** @type {Record<string, string | null>} why it failed, could not be cancelled, or is not heard of */
+  const reasons = {};
+  const fail = (/** @type {string} */ source, /** @type {string | null} */ text) => {
+    if ((reasons[source] ?? null) === text) return; // said once, heard once
+    reasons[source] = text;
+    failure.textContent = Object.values(reasons).filter(Boolean).join("\n");
+    failure.hidden = failure.textContent === "";
   };
   /** @type {number[]} */
   const losses = [];
+  let words = "";
   const tell = (/** @type {any} */ { status, progress, error }) => {
     const loss = progress?.loss ?? null;
     if (loss !== null) losses.push(Math.min(loss, losses.at(-1) ?? loss)); // the lowest so far: starts are tried in turn
     bar.value = status === "succeeded" ? 1 : (progress?.fraction ?? 0);
-    said.textContent = `${WORDS[status]}${loss === null ? "" : `, loss ${shown(loss)}`}`;
+    said.textContent = words = `${WORDS[status]}${loss === null ? "" : `, loss ${shown(loss)}`}`;
     if (spoken.dataset.status !== status) spoken.textContent = `${name}: ${WORDS[status]}`;
     spoken.dataset.status = status;
     svg.draw(losses);
     cancel.hidden = FINISHED.includes(status);
-    fail(error);
+    fail("fit", error);
   };
   const ended = (/** @type {import("./state.js").Fit} */ now) =>
     tell(now.result ? { ...now, progress: { fraction: 1, loss: now.result.objective } } : now);
   const lost = (/** @type {unknown} */ error) => {
-    said.textContent = "connection lost, trying again …";
-    fail(error instanceof Refusal ? error.message : null);
+    said.textContent = error === null ? words : error instanceof Refusal ? "trying again …" : "connection lost, trying again …";
+    fail("stream", error instanceof Refusal ? error.message : null);
   };
   cancel.addEventListener("click", async () => {
     cancel.disabled = true;
+    fail("cancel", null);
     try {
       await ask(`/v1/fits/${fit.id}/cancel`, { method: "POST" });
     } catch (error) {
       cancel.disabled = false;
-      if (!(error instanceof Refusal && error.status === 409)) fail(inWords(error)); // 409: it has just ended
+      if (!(error instanceof Refusal && error.status === 409)) fail("cancel", inWords(error)); // 409: it has just ended
     }
   });
   ended(fit);
@@ -133,7 +139,7 @@ function row(fit) {
         ended(now);
         arrived(now);
       })
-      .catch((error) => leave.signal.aborted || fail(inWords(error)));
+      .catch((error) => leave.signal.aborted || fail("stream", inWords(error)));
   }
   const element = made("div", { class: "job" }, made("span", { class: "code" }, name), bar, said, svg.element, made("span", {}, cancel, spoken), failure);
   return { element, leave };

@@ -13,7 +13,7 @@ import * as measurement from "./measurement.js";
 import * as offers from "./offers.js";
 import * as result from "./result.js";
 import * as sphere from "./sphere.js";
-import { present, state } from "./state.js";
+import { on, present, state } from "./state.js";
 import * as take from "./take.js";
 import * as where from "./where.js";
 
@@ -28,6 +28,7 @@ look.install();
 take.install();
 where.install();
 within();
+on("dataset", () => complain("link-error", null));
 window.addEventListener("hashchange", linked);
 await choice.install().catch((error) => complain("choose-error", error));
 await linked();
@@ -38,7 +39,7 @@ await offers.install().catch(() => undefined); // without it the page offers les
 /** Show the fits that the address names, as #fit=ID or #fit=ID,ID; none where it names none. */
 async function linked() {
   if (location.hash && !location.hash.startsWith("#fit=")) return;
-  const ids = location.hash.slice("#fit=".length).split(",").filter(Boolean).map(decodeURIComponent);
+  const ids = location.hash.slice("#fit=".length).split(",").filter(Boolean);
   complain("link-error", null);
   if (ids.join() === [...state.fits.keys()].join()) return;
   if (ids.length === 0) return present([]);

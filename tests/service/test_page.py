@@ -329,9 +329,11 @@ def test_models_that_one_fit_compared_stand_side_by_side(page: Any) -> None:
     expect(page, "#spheres button").to_have_count(2)
     expect(page, "#spheres [aria-pressed=true]").to_have_text("1. lambert + ward_bounded(isotropic)")
     best = page.evaluate(BALL)
+    page.evaluate("document.querySelectorAll('#controls input, .ball').forEach((one) => (one.kept = true))")
     page.locator("#spheres button").nth(1).click()
     expect(page, "#ranking tbody tr.chosen td >> nth=1").to_have_text("lambert")
     expect(page, "#details h3 >> nth=0").to_have_text("Parameters of lambert")
+    assert page.evaluate("[...document.querySelectorAll('#controls input, .ball')].every((one) => one.kept)"), "in use"
     expect(page, "#taking pre >> nth=0").to_contain_text('model="lambert")')
     page.wait_for_function("(before) => document.getElementById('sphere').toDataURL() !== before", arg=best)
     with page.expect_download() as download:
@@ -448,6 +450,10 @@ def test_the_lines_that_are_taken_away_do_the_same(
     python, curl = (page.locator("#taking pre").nth(k).inner_text() for k in (0, 1))
     asked = page.evaluate("(id) => fetch(`/v1/fits/${id}`).then((answer) => answer.json())", name)["request"]
     assert (asked["loss"], asked["conserve_energy"], asked["fixed"]) == ("cube_root", True, {})
+    page.evaluate("Object.defineProperty(navigator, 'clipboard', { value: undefined })")  # as it is without https
+    page.get_by_role("button", name="Copy the curl lines").click()
+    expect(page, "#copied").to_contain_text("The text is selected: press Ctrl+C")
+    assert page.evaluate("getSelection().toString()").strip() == curl.strip()
     (tmp_path / "FILE").write_bytes(csv_file())
     monkeypatch.chdir(tmp_path)
     same: dict[str, Any] = {}
