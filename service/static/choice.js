@@ -81,7 +81,7 @@ function ready() {
 /** @param {Event} event */
 async function begin(event) {
   event.preventDefault();
-  if (asking || state.dataset === null) return;
+  if (state.dataset === null) return;
   complain("choose-error", null);
   asking = true;
   ready();

@@ -92,9 +92,8 @@ async function take(file, declared = {}, remark = "") {
  * @param {import("./state.js").Dataset | null} dataset
  */
 function begin(dataset) {
-  const stays = dataset !== null && dataset.id === state.dataset?.id;
-  if (state.fits.size > 0 && !stays) history.pushState(null, "", location.pathname + location.search);
-  about(dataset, stays ? [...state.fits.values()] : []);
+  if (state.fits.size > 0 && dataset?.id !== state.dataset?.id) history.pushState(null, "", location.pathname + location.search);
+  about(dataset, dataset === null ? [] : [...state.fits.values()]);
 }
 
 /** @param {string} pending why nothing can be fitted now @param {string} said what is told of the file */
