@@ -420,7 +420,7 @@ def test_another_file_begins_anew_and_the_way_back_leads_to_what_was(page: Any, 
     expect(page, "#details").to_contain_text("The data do not determine ")
     expect(page, "#hand-said").to_contain_text("Conserves energy")
     assert page.evaluate(listed) == ["lambert + oren_nayar", *models]
-    assert models[0] == "oren_nayar"
+    assert models.count("oren_nayar") == 1
 
     page.go_back()
     expect(page, "#about").to_contain_text("222")
