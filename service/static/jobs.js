@@ -78,7 +78,7 @@ export async function open(ids) {
     if (dataset !== null && dataset === state.dataset?.id) present(fits);
     else about(dataset === null ? null : await there(`/v1/datasets/${dataset}`), fits);
   }
-  if (missing.length > 0) throw new Error(missing.join("\n"));
+  if (missing.length > 0) throw new Error(["Not all that was to be shown is there.", ...missing].join("\n"));
 }
 
 /**

@@ -8,6 +8,7 @@ import { state } from "./state.js";
 
 const DEGREE = Math.PI / 180;
 const SKIN = [64, 128, 214]; // red, green and blue, readable on light and on dark
+const EDGE = 6; // pixels that stay free
 const view = { turn: -60, height: 24 }; // where the eye is [degrees]
 /** @type {{vectors: number[][], f: (number | null)[]}} */
 let mesh = { vectors: [], f: [] };
@@ -62,11 +63,12 @@ function painted(canvas, { vectors, f }) {
   const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   pen.setTransform(dots, 0, 0, dots, 0, 0);
   pen.clearRect(0, 0, wide, high);
-  const size = Math.min(wide / 2.2, high / 1.35);
+  const low = Math.sin(view.height * DEGREE); // how far below the normal's foot the horizon is seen
+  const size = Math.min(wide / 2.2, (high - 2 * EDGE) / (1 + low));
   const seen = camera();
   const place = (/** @type {number[]} */ p) => {
     const [x, y, depth] = seen(p);
-    return [wide / 2 + size * x, 0.74 * high - size * y, depth];
+    return [wide / 2 + size * x, (high + size * (1 - low)) / 2 - size * y, depth];
   };
   ground(pen, place);
   const r = radius(state.scale, Math.max(...f.map((value) => value ?? 0)));

@@ -129,12 +129,14 @@ function declared() {
 /** @param {import("./state.js").Fit} fit */
 function python(fit) {
   const literal = (/** @type {unknown} */ value) => (value === true ? "True" : JSON.stringify(value));
-  const options = [["model", nameOf(fit)], ...declared(), ...told(fit.request)].map(([name, value]) => `, ${name}=${literal(value)}`).join("");
+  const options = [["model", nameOf(fit)], ...declared(), ...told(fit.request)].map(([name, value]) => `${name}=${literal(value)}`);
+  const given = [fit.request.dataset === null ? "SAMPLES" : '"FILE"', ...options];
+  const short = given.join(", ");
   const key = hasKey() ? ", api_key=KEY" : "";
   return `from service.client import Client
 
 with Client("${location.origin}"${key}) as client:
-    fit = client.fit(${fit.request.dataset === null ? "SAMPLES" : '"FILE"'}${options})
+    fit = client.fit(${short.length < 52 ? short : given.map((one) => `\n        ${one},`).join("") + "\n    "})
     print(fit.report())`;
 }
 
@@ -146,7 +148,8 @@ function curl(fit) {
   const query = new URLSearchParams(declared().map(([name, value]) => [name, String(value)]));
   const upload = `curl -sS${key} --data-binary @FILE ${quoted(`${location.origin}/v1/datasets${query.size ? "?" : ""}${query}`)}\n`;
   const data = dataset === null ? { samples: "SAMPLES" } : { dataset };
-  const body = JSON.stringify({ ...data, model: nameOf(fit), ...Object.fromEntries(told(fit.request)) });
+  const fields = Object.entries({ ...data, model: nameOf(fit), ...Object.fromEntries(told(fit.request)) });
+  const body = `{${fields.map(([name, value]) => `\n  ${JSON.stringify(name)}: ${JSON.stringify(value)}`).join()}}`;
   return `${dataset === null ? "" : upload}curl -sS${key} -H 'Prefer: wait=30' -H 'Content-Type: application/json' \\
      ${location.origin}/v1/fits -d ${quoted(body)}`;
 }
