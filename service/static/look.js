@@ -15,6 +15,8 @@ const SCALES = { linear: "linear", cube_root: "cube root", log: "log" };
 
 const ENOUGH = 4; // measured points that are worth aiming the light at
 
+const REST = 400; // [ms]
+
 const lobes = latest(20, drawLobes, (error) => complain("look-error", error, "lobes"));
 const against = latest(160, drawAgainst, (error) => complain("look-error", error, "curves"));
 
@@ -160,6 +162,8 @@ async function drawAgainst(signal) {
 /** What the certificate says of a fit, or of it with the values set by hand. @param {import("./state.js").Fit} fit @param {AbortSignal} signal */
 async function verdictOf(fit, signal) {
   if (!byHand(fit)) return fit.result.certificate.verdict;
+  await new Promise((done) => setTimeout(done, REST)); // it takes longer than all else, so that a slider rests first
+  signal.throwIfAborted();
   const material = { ...fit.result.material, values: valuesOf(fit) };
   const json = { material, theta_deg: [0], tolerance: 0.1, certificate: true };
   return once(`${fit.id} verdict ${JSON.stringify(state.values)}`, async () => (await get("/v1/albedo", { method: "POST", json, signal })).certificate.verdict);
