@@ -24,7 +24,7 @@ class CertificateView(View):
     energy_conserving: bool
     decided: bool = Field(description="whether the claimed error leaves no doubt of that")
     max_albedo: float | None = Field(description="the largest directional albedo [1]")
-    error: float = Field(description="claimed for it [1]")
+    error: float | None = Field(description="claimed for it [1]")
     at_theta_deg: float = Field(description="where it is; 90 is the limit towards grazing")
     at_phi_deg: float
     channel: int
