@@ -261,7 +261,9 @@ def test_misfit_is_not_taken_for_noise() -> None:
     assert chosen(fit)["Fresnel"]
 
 
-@pytest.mark.parametrize(("paint", "lobes", "most"), [("cayman", 1, 0.07), ("garnet_red", 2, 0.05)])
+@pytest.mark.parametrize(
+    ("paint", "lobes", "most"), [("cayman", 1, 0.07), pytest.param("garnet_red", 2, 0.05, marks=pytest.mark.full)]
+)
 def test_real_paints_get_the_lobes_that_they_have(paint: str, lobes: int, most: float, measured: pathlib.Path) -> None:
     """The error falls to the fraction `most` of Lambert's; peaks at grazing angles call for both only together."""
     fit = bc.fit(bc.read(measured / "cornell" / f"{paint}.brdf", quantity="brdf").to_rgb(), "auto")
