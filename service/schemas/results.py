@@ -61,7 +61,7 @@ class RungView(View):
     effect: str
     model: str
     error: float | None = Field(description="root mean square of the loss's residuals")
-    held_out: float | None = Field(description="the same at incidences that were left out")
+    held_out: float | None = Field(description="the same at incidences that were left out, their geometric mean")
     criterion: float | None = Field(description="below 0 it asks for the richer of the two materials compared [1]")
     parameters: int
     seconds: float
