@@ -33,7 +33,7 @@ export async function install() {
   const diffuse = state.models.filter((model) => isDiffuse(model) && !named(model, "f0"));
   lobes.sort((a, b) => Number(AT_FIRST.includes(b.name)) - Number(AT_FIRST.includes(a.name)));
   at("lobes").append(...lobes.map(entry));
-  at("diffuse").append(...diffuse.map(({ name }) => made("option", { value: name }, name)), made("option", { value: "" }, "none"));
+  at("diffuse").append(...diffuse.map(({ name, good_for }) => made("option", { value: name }, `${name}: ${good_for}`)), made("option", { value: "" }, "none"));
   ready();
 }
 
@@ -43,9 +43,9 @@ function named(model, parameter) {
 }
 
 /** @param {any} model */
-function entry({ name, summary }) {
+function entry({ name, good_for: line }) {
   const box = made("input", { type: "checkbox", name: "lobe", value: name, checked: AT_FIRST.includes(name) });
-  return made("label", { class: "model" }, box, made("span", {}, made("b", {}, name), made("span", {}, summary)));
+  return made("label", { class: "model" }, box, made("span", {}, made("b", {}, name), made("span", {}, line)));
 }
 
 /** Offer the choice by the data where this service knows it. */

@@ -365,6 +365,7 @@ def test_every_model_is_listed(http: TestClient) -> None:
     models = http.get("/v1/models").json()["items"]
     assert [model["name"] for model in models] == list(bc.MODELS)
     for model in models:
+        assert model["good_for"] == bc.MODELS[model["name"]].good_for
         assert model["summary"]
         assert model["summary"] in model["text"]
         assert all({"name", "description", "low", "high"} <= set(parameter) for parameter in model["parameters"])
