@@ -109,6 +109,7 @@ def left_out(problem: Problem, x: Tensor, fold: Tensor) -> tuple[Tensor, Tensor]
         data.c,
         data.y.expand(folds, -1, -1),
         data.root_weight * seen,
+        data.root_factor,
         None if data.sigma is None else data.sigma.expand(folds, -1, -1),
         data.scales.rows(torch.zeros_like(which)),
     )

@@ -146,8 +146,9 @@ class Problem:
             r = r.detach()
         if self.plan.robust is None or self.robust_scale is None:
             return r.square(), r, slope
-        scale = self.robust_scale if which is None else self.robust_scale[which]
-        rho, r, root = softened(ROBUST[self.plan.robust], scale.reshape(-1, 1, 1), r)
+        scale = (self.robust_scale if which is None else self.robust_scale[which]).reshape(-1, 1, 1)
+        counted = torch.where(data.root_factor > 0, data.root_factor, 1.0)
+        rho, r, root = softened(ROBUST[self.plan.robust], scale * counted, r)  # w s^2 rho(r^2 / (w s^2)) for w r^2
         return rho, r, slope * root
 
     def loss(self, x: Tensor, which: Tensor | None = None) -> Tensor:
