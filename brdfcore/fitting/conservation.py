@@ -33,7 +33,7 @@ from .levenberg_marquardt import Outcome
 from .plan import Plan
 from .problem import Problem
 from .result import Conservation, Fit
-from .search import Found, Say, search
+from .search import Found, Say, joined, search
 from .solve import solve_box
 from .worth import fits
 
@@ -58,7 +58,7 @@ def conserving(free: Fit, found: Found, kept: Samples, whole: Samples, optimizer
     certificate, directions = free.certificate, torch.zeros(0, 2, dtype=torch.float64)
     while math.isinf(certificate.max_albedo) and (plan := _limited(found)) is not None:
         fixed = (*fixed, *(plan.fixed - found.problem.plan.fixed))
-        found = _joined(found, search(plan, [kept], loss, optimizer, seed, say))
+        found = joined(found, search(plan, [kept], loss, optimizer, seed, say))
         certificate = _certificate(found)
     for done in range(ROUNDS):
         hopeless = len(directions) > 0 and not bool(found.outcome.converged[0])
@@ -108,13 +108,6 @@ def _sentence(it: Conservation, made: Fit, *, reached: bool) -> str:
 def _certificate(found: Found) -> Certificate:
     problem = found.problem
     return certify(Material(problem.plan.form, problem.unpack(found.outcome.x[0])), tolerance=MARGIN)
-
-
-def _joined(before: Found, after: Found) -> Found:
-    """What came after, its cost with that of what came before."""
-    return replace(
-        after, evaluations=before.evaluations + after.evaluations, iterations=before.iterations + after.iterations
-    )
 
 
 def _limited(found: Found) -> Plan | None:

@@ -74,6 +74,53 @@ def test_a_few_bad_samples_do_not_decide(name: str, loss: str) -> None:
 
 
 @pytest.mark.parametrize("name", ROBUST)
+def test_a_fifth_of_gross_outliers_does_not_decide(name: str) -> None:
+    """They inflate the spread about the plain optimum tenfold and more: one turn of spread and fit is not enough."""
+    good = measured_from(TRUE, noise=0.003)
+    values = good.values.clone()
+    values[::5] *= 10
+    fit = bc.fit(bc.Samples(good.wi, good.wo, values), MODEL, robust=name)
+    for key, value in bc.material(TRUE).values().items():
+        off = {"soft_l1": 0.12, "cauchy": 0.03}[name]
+        assert float(fit.parameters[key]) == pytest.approx(float(value.detach()), rel=off), key
+
+
+def test_the_scale_is_that_of_the_residuals_where_the_fit_ends() -> None:
+    samples = spoiled()
+    fit = bc.fit(samples, MODEL, robust="cauchy")
+    r = samples.wi[:, 2:] * (fit.material.f(samples.wi, samples.wo).detach() - samples.values)
+    scale = ROBUST["cauchy"].multiple * 1.4826 * float(r.abs().median())
+    again = bc.fit(samples, MODEL, robust="cauchy", robust_scale=scale)
+    assert fit.objective == pytest.approx(again.objective, rel=0.01)
+
+
+def test_samples_of_weight_0_do_not_make_the_scale() -> None:
+    """Most samples without weight, far off: the fit is that to the others alone."""
+    good = spoiled()
+    values, weight = good.values.clone(), torch.zeros(len(good))
+    weight[:60] = 1
+    values[60:] = 3
+    whole = bc.fit(bc.Samples(good.wi, good.wo, values, weight=weight), MODEL, robust="cauchy")
+    alone = bc.fit(good.subset(torch.arange(60)), MODEL, robust="cauchy")
+    assert whole.objective == pytest.approx(alone.objective, rel=1e-6)
+    for key, value in alone.parameters.items():
+        torch.testing.assert_close(whole.parameters[key], value, rtol=1e-6, atol=0)
+
+
+@pytest.mark.parametrize("name", ROBUST)
+def test_a_sample_of_weight_2_is_one_that_is_there_twice(name: str) -> None:
+    samples = spoiled()
+    twice = torch.arange(len(samples)) % 3 == 0
+    weight = 1 + twice.double()
+    more = torch.cat([torch.arange(len(samples)), twice.nonzero()[:, 0]])
+    weighted = bc.fit(bc.Samples(samples.wi, samples.wo, samples.values, weight=weight), MODEL, robust=name)
+    repeated = bc.fit(samples.subset(more), MODEL, robust=name)
+    assert weighted.objective == pytest.approx(repeated.objective, rel=1e-9)
+    for key, value in repeated.parameters.items():
+        torch.testing.assert_close(weighted.parameters[key], value, rtol=1e-6, atol=0)
+
+
+@pytest.mark.parametrize("name", ROBUST)
 def test_the_optimum_is_scipys_with_the_same_scale(name: str) -> None:
     samples, scale = spoiled(), 0.004
     fit = bc.fit(samples, MODEL, robust=name, robust_scale=scale)
