@@ -50,8 +50,8 @@ class Fit:
 
     plan, form, values, samples: what was asked, fitted, the best values, stored parameters only, and to what.
     parameters, standard_errors: key -> () or (C,); intervals: key -> (2,) or (C, 2), 95 %. NaN stands where there is no
-    number to give: in an interval for a value that was fixed or lies on an end of its box, and everywhere for one
-    that the data leave undetermined. `objective` is the loss that was minimised: chi-square where the samples' sigma
+    number to give: in an interval for a value that was fixed or that the data hold on an end of its box (ends.py), and
+    everywhere for one that they leave undetermined. `objective` is the loss that was minimised: chi-square where the samples' sigma
     weighed it, else the error of that name.
 
     status              "converged"; "undetermined", converged but with values that the data leave free; or

@@ -48,7 +48,7 @@ def fits(
     names = [name_of(problem, at, channels) for at in range(problem.size)]
     covariances = _certain(known.covariance, names)
     of_row = {key: value.reshape(len(x), *plan.start[key].shape).unbind() for key, value in values.items()}
-    held, vague = known.held.tolist(), known.vague.tolist()
+    held, by_chance, vague = (flags.tolist() for flags in (known.held, known.by_chance, known.vague))
     found, spent = [], cost()
     for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
         parameters, standard_errors, intervals = described[row]
@@ -72,7 +72,14 @@ def fits(
                 weighed=weighed,
                 status=("undetermined" if undetermined else "converged") if ends[row] else "stopped_early",
                 message=_message(
-                    problem, held[row], vague[row], undetermined, freedom[row], converged=ends[row], weighed=weighed
+                    problem,
+                    held[row],
+                    by_chance[row],
+                    vague[row],
+                    undetermined,
+                    freedom[row],
+                    converged=ends[row],
+                    weighed=weighed,
                 ),
                 warnings=told[row],
                 choices=plan.choices,
@@ -143,6 +150,7 @@ def _described(problem: Problem, values: dict[str, Tensor], known: Uncertainty) 
 def _message(
     problem: Problem,
     held: list[bool],
+    by_chance: list[bool],
     vague: list[bool],
     undetermined: Sequence[str],
     freedom: int,
@@ -150,7 +158,7 @@ def _message(
     converged: bool,
     weighed: bool,
 ) -> str:
-    """What the user must know of a result, in sentences; `held` and `vague` are by raw position."""
+    """What the user must know of a result, in sentences; `held`, `by_chance` and `vague` are by raw position."""
     if not problem.size:
         parts = ["Every value is fixed, so this is an evaluation."]
     elif converged:
@@ -163,6 +171,13 @@ def _message(
     if on_end:
         where = " in some channel" if problem.channels > 1 else ""
         parts.append(f"{', '.join(on_end)} ended on an end of the box{where}, so no interval is given there.")
+    near_end = [key for key, at in problem.slices.items() if any(by_chance[at])]
+    if near_end:
+        where = " in some channel" if problem.channels > 1 else ""
+        parts.append(
+            f"{', '.join(near_end)} ended on an end of the box{where}, where noise alone may have put it, so the "
+            "interval reaches inwards from there."
+        )
     together = [words for words in undetermined if " with " in words]
     alone = [words for words in undetermined if words not in together]
     if alone:
