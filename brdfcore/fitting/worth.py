@@ -38,7 +38,8 @@ def fits(
     chi_square: list[float] | None = None
     if problem.data.sigma is not None:
         f = torch.cat([problem.f(x, piece) for piece in problem.data.chunks(len(x))], dim=-1)  # (M, C, N)
-        chi_square = ((f - problem.data.y) / problem.data.sigma).square().sum((1, 2)).tolist()
+        squares = ((f - problem.data.y) / problem.data.sigma).square()
+        chi_square = torch.where(problem.data.root_weight > 0, squares, 0.0).sum((1, 2)).tolist()
     minima = outcome.loss
     if problem.loss_kind.is_mean and not (weighed or plan.robust):
         minima = root_mean(minima, stacked_weights(fitted, problem.loss_kind), problem.channels)
