@@ -20,6 +20,7 @@ from .data import Data
 from .folds import split
 from .least_squares import least_squares
 from .problem import Problem
+from .result import number
 from .search import search
 
 _STEPS = 40  # of a fold; it begins next to its optimum
@@ -28,7 +29,10 @@ _ENOUGH = 1e-9  # of a fold's loss: what another step would gain
 
 @dataclass(frozen=True)
 class Incidence:
-    """A block of samples that were left out together: its mean theta_i [rad], fold, samples and error."""
+    """A block of samples that were left out together: its mean theta_i [rad], fold, samples and error.
+
+    The error is NaN where no sample of the block has weight.
+    """
 
     theta: float
     fold: int
@@ -40,6 +44,7 @@ class Incidence:
 class HeldOut:
     """Errors at samples that were left out, root mean squares in the unit of the loss's residual, by fold and by block.
 
+    NaN stands for a fold or block in which no sample has weight.
     `fitted` is the same error of the fit to all samples, at the samples it was fitted to.
     """
 
@@ -51,8 +56,10 @@ class HeldOut:
     seconds: float  # without the fit to all samples
 
     def to_dict(self) -> dict[str, Any]:
-        """The errors as JSON-able data."""
-        return {**vars(self), "folds": list(self.folds), "incidences": [vars(one).copy() for one in self.incidences]}
+        """The errors as JSON-able data, null where there is no number."""
+        blocks = [{**vars(one), "error": number(one.error)} for one in self.incidences]
+        whole = {"error": number(self.error), "fitted": number(self.fitted)}
+        return {**vars(self), **whole, "folds": [number(one) for one in self.folds], "incidences": blocks}
 
 
 def held_out(
@@ -134,7 +141,7 @@ def _squares(problem: Problem, x: Tensor, row: Tensor) -> Tensor:
 
 
 def _mean(values: Tensor, weights: Tensor, label: Tensor) -> Tensor:
-    """The sums of the values over those of the weights, a label (L,)."""
+    """The sums of the values over those of the weights, a label (L,); NaN for a label without weight."""
     sums = torch.zeros(2, int(label.max()) + 1, dtype=torch.float64)
     sums.index_add_(1, label, torch.stack([values, weights]))
-    return sums[0] / sums[1].clamp(min=1e-300)
+    return sums[0] / sums[1]

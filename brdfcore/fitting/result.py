@@ -51,8 +51,8 @@ class Fit:
     plan, form, values, samples: what was asked, fitted, the best values, stored parameters only, and to what.
     parameters, standard_errors: key -> () or (C,); intervals: key -> (2,) or (C, 2), 95 %. NaN stands where there is no
     number to give: in an interval for a value that was fixed or that the data hold on an end of its box (ends.py), and
-    everywhere for one that they leave undetermined. `objective` is the loss that was minimised: chi-square where the samples' sigma
-    weighed it, else the error of that name.
+    everywhere for one that they leave undetermined. `objective` is what was minimised: chi-square where the samples'
+    sigma weighed the loss, the sum of rho under a robust form, else the error of that name.
 
     status              "converged"; "undetermined", converged but with values that the data leave free; or
                         "stopped_early". `message` says more
@@ -133,14 +133,14 @@ class Fit:
             "material_text": str(self.material),
             "material": self.material.to_json(),
             "loss": self.loss,
-            "objective": _number(self.objective),
+            "objective": number(self.objective),
             "status": self.status,
             "message": self.message,
             "parameters": {key: _numbers(value) for key, value in self.parameters.items()},
             "standard_errors": {key: _numbers(value) for key, value in self.standard_errors.items()},
             "intervals": {key: _intervals(value) for key, value in self.intervals.items()},
             "units": self.units(),
-            "errors": {key: _number(value) for key, value in self.errors.items()},
+            "errors": {key: number(value) for key, value in self.errors.items()},
             "undetermined": list(self.undetermined),
             "combinations": [dict(one) for one in self.combinations],
             "singular_values": list(self.singular_values),
@@ -223,15 +223,16 @@ def _row(key: str, value: float | None, interval: list[float] | None, without: s
 
 
 def _conservation(it: Conservation) -> dict[str, Any]:
-    return {**vars(it), "free_max_albedo": _number(it.free_max_albedo), "fixed": list(it.fixed)}
+    return {**vars(it), "free_max_albedo": number(it.free_max_albedo), "fixed": list(it.fixed)}
 
 
-def _number(value: float) -> float | None:
+def number(value: float) -> float | None:
+    """The number as JSON can hold it: None where it is infinite or NaN."""
     return value if math.isfinite(value) else None
 
 
 def _numbers(value: Tensor) -> Any:
-    return _number(value.item()) if value.ndim == 0 else [_number(v) for v in value.tolist()]
+    return number(value.item()) if value.ndim == 0 else [number(v) for v in value.tolist()]
 
 
 def _intervals(value: Tensor) -> Any:

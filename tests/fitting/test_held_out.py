@@ -122,3 +122,18 @@ def test_refusals() -> None:
     with pytest.raises(bc.errors.SamplesError, match=r"^Expected samples to hold several directions") as caught:
         bc.held_out(same, "lambert")
     assert caught.value.field == "samples"
+
+
+def test_a_block_without_weight_has_no_error() -> None:
+    incidences = [10.0, 20.0, 35.0, 50.0, 60.0, 70.0]
+    samples = goniometer(incidences)
+    theta = torch.rad2deg(torch.acos(samples.wi[:, 2]))
+    weight = (theta < 65).double()
+    found = bc.held_out(bc.Samples(samples.wi, samples.wo, samples.values, weight=weight), MODEL, folds=3)
+    without = [one for one in found.incidences if round(math.degrees(one.theta)) == 70]
+    assert [math.isnan(one.error) for one in without] == [True]
+    assert all(one.error > 0 for one in found.incidences if one not in without)
+    data = found.to_dict()
+    assert [one["error"] for one in data["incidences"]].count(None) == 1
+    assert data["error"] == found.error
+    json.dumps(data, allow_nan=False)
