@@ -63,7 +63,7 @@ def fit(
     bounds       key -> (low, high), a box within the parameter's own; starts are drawn from it
     starts       values by key of further starts, beside those of the text and of the scan
     robust       "soft_l1" or "cauchy": the loss's residuals count less the larger they are (robust.py), beyond
-    robust_scale in the residual's unit; without it, a multiple of the residuals' spread
+    robust_scale in the residual's unit; without it, a multiple of the residuals' spread, of several models one for all
     max_theta    [rad] leaves out samples with a direction steeper than this, as the literature on MERL drops 80 degrees
     conserve_energy  keeps the directional albedo at 1 or below at every angle; `conservation` says what that cost
 
@@ -86,8 +86,9 @@ def fit(
     }
     if model == AUTO or not isinstance(model, str):
         from .selection import select  # which makes its fits here
+        from .shared_scale import with_shared_scale
 
-        return select(samples, model, progress, **keywords)
+        return select(samples, model, progress, **with_shared_scale(samples, model, keywords))
     begun = time.perf_counter()
     plan, (kept,) = planned([samples], model, **keywords)
     say = Teller(progress)

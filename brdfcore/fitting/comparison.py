@@ -16,6 +16,7 @@ from ._fit import Progress, Teller, check_samples, fit
 from .asked import check, form_of, own
 from .losses import LOSSES
 from .result import Fit
+from .shared_scale import with_shared_scale
 
 LOBES = tuple(name for name, model in MODELS.items() if not issubclass(model, CosineSampled))
 
@@ -114,6 +115,7 @@ def compare(
     keywords = {**keywords, "loss": loss}
     check(samples.values.shape[1], texts, azimuth_observed=observed, **keywords)
     begun = time.perf_counter()
+    keywords = with_shared_scale(samples, texts, keywords)
     found = []
     for i, text in enumerate(texts):
         concerned = own(keywords, form_of(text, azimuth_observed=observed))

@@ -58,7 +58,7 @@ def conserving(free: Fit, found: Found, kept: Samples, whole: Samples, optimizer
     certificate, directions = free.certificate, torch.zeros(0, 2, dtype=torch.float64)
     while math.isinf(certificate.max_albedo) and (plan := _limited(found)) is not None:
         fixed = (*fixed, *(plan.fixed - found.problem.plan.fixed))
-        found = joined(found, search(plan, [kept], loss, optimizer, seed, say))
+        found = joined(found, search(_at_scale(found, plan), [kept], loss, optimizer, seed, say))
         certificate = _certificate(found)
     for done in range(ROUNDS):
         hopeless = len(directions) > 0 and not bool(found.outcome.converged[0])
@@ -128,6 +128,12 @@ def _limited(found: Found) -> Plan | None:
         if scale in own and keys[scale] in plan.free and bool((plan.limits(keys[scale])[0] <= 0).all()):
             return _with_fixed(plan, keys[scale], torch.zeros(()))
     return None
+
+
+def _at_scale(found: Found, plan: Plan) -> Plan:
+    """The plan at the robust scale that what was found has: only then do the objectives compare."""
+    scale = found.problem.robust_scale
+    return plan if scale is None else replace(plan, robust_scale=float(scale[0]))
 
 
 def _with_fixed(plan: Plan, key: str, value: Tensor) -> Plan:

@@ -74,17 +74,21 @@ def search(plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, se
             None if plan.robust_scale is None else torch.full((len(samples),), plan.robust_scale, dtype=torch.float64)
         )
         return _found(plan, samples, loss, optimizer, seed, say, given)
-    form, few = ROBUST[plan.robust], _subset(samples, seed)
-    plain = _found(replace(plan, robust=None), few, loss, optimizer, seed, _part(say, 0.0, 0.4), None)
-    near = _settled(plan, form, plain)
+    near = near_scale(plan, samples, loss, optimizer, seed, _part(say, 0.0, 0.4))
     found = _found(plan, samples, loss, optimizer, seed, _part(say, 0.4, 0.9), near.problem.robust_scale)
-    which = torch.arange(len(samples))
-    before = found.problem.loss(near.outcome.x, which)
+    before = found.problem.loss(near.outcome.x, torch.arange(len(samples)))
     lower = before < (1 - _RACE_ALL) * found.outcome.loss
     if bool(lower.any()):
         x = torch.where(lower.unsqueeze(-1), near.outcome.x, found.outcome.x)
         found = replace(found, outcome=found.outcome._replace(x=x))
-    return joined(near, _settled(plan, form, found))
+    return joined(near, _settled(plan, ROBUST[plan.robust], found))
+
+
+def near_scale(plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, seed: int, say: Say) -> Found:
+    """A robust optimum of a subset, at the scale that its own residuals make: a first one, of few samples."""
+    few = _subset(samples, seed)
+    plain = _found(replace(plan, robust=None, robust_scale=None), few, loss, optimizer, seed, say, None)
+    return _settled(plan, ROBUST[plan.robust or ""], plain)
 
 
 def _settled(plan: Plan, form: Robust, found: Found) -> Found:
