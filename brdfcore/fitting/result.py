@@ -74,6 +74,7 @@ class Fit:
     loss: str
     objective: float
     weighed: bool  # whether the samples' sigma weighed the loss
+    robust_scale: float | None  # beyond which residuals count less, in their unit or in sigma, under a robust form
     status: str
     message: str
     undetermined: tuple[str, ...]
@@ -122,6 +123,19 @@ class Fit:
         found = (self.covariance * scale * scale.unsqueeze(-1)).clamp(-1, 1)
         return found.fill_diagonal_(1.0)
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """What the fit was asked beside model, loss, seed and which values are fixed, gray or one a channel."""
+        plan = self.plan
+        return {
+            "bounds": {key: list(pair) for key, pair in plan.bounds.items()},
+            "starts": [{key: _numbers(value) for key, value in start.items()} for start in plan.starts],
+            "robust": plan.robust,
+            "robust_scale": self.robust_scale,
+            "max_theta_deg": None if plan.max_theta is None else math.degrees(plan.max_theta),
+            "conserve_energy": plan.conserve_energy,
+        }
+
     def units(self) -> dict[str, str]:
         """What each parameter is, with its unit."""
         return {key: parameter.description for key, parameter in self.form.all_parameters.items()}
@@ -133,6 +147,8 @@ class Fit:
             "material_text": str(self.material),
             "material": self.material.to_json(),
             "loss": self.loss,
+            "weighed": self.weighed,
+            "options": self.options,
             "objective": number(self.objective),
             "status": self.status,
             "message": self.message,
@@ -202,6 +218,7 @@ def _report(result: dict[str, Any], correlated: list[str]) -> str:
         lines.append(f"singular values of the scaled Jacobian: {singular[0]:.3g} down to {singular[-1]:.3g}")
     if correlated:
         lines.append("strongly correlated: " + ", ".join(correlated))
+    lines += _asked(result["options"], result["weighed"])
     lines += [f"note: {sentence}" for sentence in result["warnings"]]
     lines.append(result["certificate"]["verdict"])
     lines += table(result["ladder"])
@@ -214,6 +231,21 @@ def _report(result: dict[str, Any], correlated: list[str]) -> str:
     )
     lines.append(f"brdfcore {made['version']}, torch {made['torch']}, seed {made['seed']}, input {made['input']}")
     return "\n".join(lines)
+
+
+def _asked(options: dict[str, Any], weighed: bool) -> list[str]:
+    """The options that the fit was given, a line each kind."""
+    lines = []
+    if options["robust"]:
+        unit = " sigma" * weighed
+        lines.append(f"robust: {options['robust']}, residuals beyond {options['robust_scale']:.4g}{unit} count less")
+    if options["bounds"]:
+        lines.append("bounds: " + ", ".join(f"{key} [{a:.6g}, {b:.6g}]" for key, (a, b) in options["bounds"].items()))
+    if options["starts"]:
+        lines.append(f"starts given: {len(options['starts'])}")
+    if options["max_theta_deg"] is not None:
+        lines.append(f"directions up to {options['max_theta_deg']:.6g} degrees")
+    return lines
 
 
 def _row(key: str, value: float | None, interval: list[float] | None, without: str, what: str) -> str:

@@ -43,6 +43,7 @@ def fits(
     minima = outcome.loss
     if problem.loss_kind.is_mean and not (weighed or plan.robust):
         minima = root_mean(minima, stacked_weights(fitted, problem.loss_kind), problem.channels)
+    scales = None if plan.robust is None or problem.robust_scale is None else problem.robust_scale.tolist()
     freedom, objectives, ends = known.freedom.tolist(), minima.tolist(), outcome.converged.tolist()
     typical = torch.as_tensor(problem.data.scales.y, dtype=torch.float64).reshape(-1)
     told = warnings(plan, supports(fitted[0]), problem.data.y, typical, problem.loss_kind.name)
@@ -71,6 +72,7 @@ def fits(
                 loss=problem.loss_kind.name,
                 objective=objectives[row],
                 weighed=weighed,
+                robust_scale=None if scales is None else scales[row],
                 status=("undetermined" if undetermined else "converged") if ends[row] else "stopped_early",
                 message=_message(
                     problem,
@@ -195,6 +197,10 @@ def _message(
         )
     if problem.data.sigma is None and freedom <= 0:
         parts.append("There are no more samples than values, so no interval can be given.")
-    if weighed:
+    if weighed and problem.plan.robust is None:
         parts.append("Samples were weighted by 1/sigma^2, so the minimised loss is chi-square.")
+    elif weighed:
+        parts.append(
+            f"Residuals were counted in sigma and made {problem.plan.robust}, so the minimised loss is not chi-square."
+        )
     return " ".join(parts)
