@@ -7,7 +7,8 @@ fit to old and new samples will have, under its loss, whether or not that weighs
 v; else the residuals do, as noise that is even and noise that grows with the value (signal_noise.py), and both are
 carried to the new directions. Values are taken one by one, then exchanged one by one as long as that gains. A value
 that the data leave free is known to lie in its box and no better, so that the first directions are those that
-determine it.
+determine it. Under a loss that does not weigh as the noise would, a noisy sample can make some value less sure than it
+was, however much it tells of others: directions that would are passed over, as long as there are others.
 
 What is proposed lies on a grid that a goniometer reaches: polar angles to `max_theta`, in the plane of incidence, and
 out of it where the data are; the sample is turned where the data's was. Values on an end of their box count as if
@@ -16,7 +17,6 @@ Source: Fedorov 1972, exchange of design points; White 1980 for A^-1 B A^-1.
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +39,8 @@ _STEP = 5.0  # degrees between polar angles
 _NEAR = (-8.0, -6.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)  # degrees from the mirror direction
 _TURN = 30.0  # degrees between azimuths
 _ROUNDS = 4  # of exchanges; one or two find all there is
+_TRIED = 512  # of the best candidates, among which one that makes no value less sure is looked for
+_AT_ONCE = 64  # of those
 _WORK = 2e8  # candidates times the cube of the values: the grid is thinned beyond
 
 
@@ -99,8 +101,7 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
     columns, variance = design.candidates(wi, wo)
     chosen = _exchanged(design, columns, variance, min(count, len(wi)))
     before = design.covariance(design.a, design.b)
-    a, b = design.with_(columns[chosen], variance[chosen])
-    after = design.covariance(a.sum(0) + design.a, b.sum(0) + design.b)
+    after = design.covariance(*design.joined(columns[chosen], variance[chosen]))
     ratio = (after.diagonal() / before.diagonal()).sqrt()
     shrinkage = {key: ratio[at].reshape(plan.start[key].shape) for key, at in problem.slices.items()}
     information = float(torch.logdet(before) - torch.logdet(after))
@@ -188,6 +189,11 @@ class _Design:
         b = self.problem.scatter_matrix(each * variance[..., None, None])
         return a, b
 
+    def joined(self, columns: Tensor, variance: Tensor) -> tuple[Tensor, Tensor]:
+        """A and B of the samples so far and of some candidates together, (D, D)."""
+        a, b = self.with_(columns, variance)
+        return self.a + a.sum(0), self.b + b.sum(0)
+
     def covariance(self, a: Tensor, b: Tensor) -> Tensor:
         """A^-1 B A^-1."""
         inverse = torch.linalg.inv(a)
@@ -207,16 +213,24 @@ class _Design:
 def _exchanged(design: _Design, columns: Tensor, variance: Tensor, count: int) -> list[int]:
     """The candidates that make the values surest: one by one, then each exchanged for a better one if there is one."""
     chosen: list[int] = []
+    before = design.covariance(design.a, design.b).diagonal().clamp(min=1e-300)
 
-    def best(without: Iterable[int]) -> tuple[int, float]:
-        rest = list(without)
-        a, b = design.a, design.b
-        if rest:
-            more_a, more_b = design.with_(columns[rest], variance[rest])
-            a, b = a + more_a.sum(0), b + more_b.sum(0)
+    def best(rest: list[int]) -> tuple[int, float]:
+        a, b = design.joined(columns[rest], variance[rest])
         score = design.information(a, b, columns, variance)
         score[rest] = -torch.inf
-        at = int(score.nan_to_num(nan=-torch.inf).argmax())
+        score = score.nan_to_num(nan=-torch.inf)
+        order = score.argsort(descending=True, stable=True)[: min(_TRIED, len(score) - len(rest))]
+        growths = []
+        for some in order.split(_AT_ONCE):
+            more_a, more_b = design.with_(columns[some], variance[some])
+            after = design.covariance(a + more_a, b + more_b).diagonal(dim1=-2, dim2=-1)
+            growths.append((after / before).amax(-1).nan_to_num(nan=torch.inf))
+            surer = growths[-1] <= 1 + 1e-9
+            if bool(surer.any()):
+                at = int(some[int(surer.int().argmax())])
+                return at, float(score[at])
+        at = int(order[int(torch.cat(growths).argmin())])
         return at, float(score[at])
 
     reached = -math.inf

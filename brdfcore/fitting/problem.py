@@ -200,13 +200,13 @@ class Problem:
         """(S, C, P) by channel and name, summed into (S, D)."""
         flat = self.index.reshape(-1)
         out = torch.zeros(len(by_channel), self.size, dtype=torch.float64)
-        return out.index_add_(1, flat, by_channel.reshape(len(by_channel), -1))
+        return out.index_add_(1, flat, by_channel.flatten(1))
 
     def scatter_matrix(self, by_channel: Tensor) -> Tensor:
         """(S, C, P, P) by channel and names, summed into (S, D, D)."""
         flat = (self.index.unsqueeze(-1) * self.size + self.index.unsqueeze(-2)).reshape(-1)
         out = torch.zeros(len(by_channel), self.size * self.size, dtype=torch.float64)
-        out.index_add_(1, flat, by_channel.reshape(len(by_channel), -1))
+        out.index_add_(1, flat, by_channel.flatten(1))
         return out.reshape(-1, self.size, self.size)
 
     def held(self, x: Tensor, gradient: Tensor) -> Tensor:

@@ -54,6 +54,15 @@ def test_the_predicted_shrinkage_is_that_of_refits(sigma: bool) -> None:
     assert min(float(s) for s in next_.shrinkage.values()) < 0.8
 
 
+@pytest.mark.parametrize("loss", ["cosine", "log"])
+def test_no_value_becomes_less_sure(loss: str) -> None:
+    """Noise that grows with the value, under losses that do not weigh so: near grazing it would blur what is known."""
+    fit = bc.fit(measured(KURT, within(geometry(turned=False), 75), 0, share=0.1), FIXED, loss=loss)
+    next_ = bc.next_directions(fit, 6)
+    assert max(float(s.max()) for s in next_.shrinkage.values()) <= 1 + 1e-9
+    assert next_.information > 0.1
+
+
 def information(fit: bc.Fit, wi: torch.Tensor, wo: torch.Tensor, share: float) -> torch.Tensor:
     """The matrix sum of (df/dx)^2 / sigma^2 by differences, for a sigma that is a share of f."""
     columns = []
