@@ -223,8 +223,8 @@ def test_bounds_hold_and_starts_lead_to_their_optimum() -> None:
     samples = measured_from("lambert(kd=0.1) + ward_bounded(isotropic, rs=0.1, a=0.3)", noise=0.01)
     for loss in bc.LOSSES:
         fit = bc.fit(samples, MODEL, loss=loss, bounds={"ward_bounded.a": (0.01, 0.2), "lambert.kd": (0.15, 1.0)})
-        assert 0.01 <= float(fit.parameters["ward_bounded.a"]) <= 0.2 * (1 + 1e-15)
-        assert float(fit.parameters["lambert.kd"]) >= 0.15
+        assert 0.01 <= float(fit.values["ward_bounded.a"]) <= 0.2 * (1 + 1e-15)
+        assert float(fit.values["lambert.kd"]) >= 0.15
     free = bc.fit(samples, MODEL)
     assert bc.fit(samples, MODEL, starts=[{"ward_bounded.a": 5.0}]).objective == pytest.approx(free.objective, rel=1e-9)
     assert bc.fit(samples, MODEL, starts=[{}]).cost.starts == free.cost.starts + 1
