@@ -16,7 +16,7 @@ from ..errors import WRITES, ProblemError, inlined, responses
 from ..jobs.records import Job
 from ..materials import material_of
 from ..schemas import AlbedoRequest, AlbedoView, TablePage, TableSummary, TableView
-from ..state import State, state
+from ..state import state
 from . import _jobs
 from ._http import accepted_of, json_accepted, json_content, parsed
 
@@ -25,6 +25,7 @@ router = APIRouter(prefix="/v1/albedo", tags=["albedo"])
 _JSON = [Depends(json_accepted)]
 _JSON_LIMIT = 2**20  # bytes
 _MOST_INTEGRALS = {1e-7: 1000, 0.0: 100}  # directions times terms for tolerances from these on: up to 20 s of work
+_CERTIFYING = 50  # integrals that take as long as the certificate of one term
 _MOST_CHANNELS = 64  # each may be a lobe of its own
 _TOLERANCE = 1e-6  # where a request states none
 _NPZ = ("application/x-npz", "application/octet-stream")
@@ -53,7 +54,8 @@ async def albedo(request: Request) -> Response:
     asked = await asyncio.to_thread(parsed, AlbedoRequest, content)
     if asked.axes is None:
         loop = asyncio.get_running_loop()
-        answer = await loop.run_in_executor(service.computing, _values, asked)
+        thread = service.aside if asked.certificate else service.computing  # it may take a second
+        answer = await loop.run_in_executor(thread, _values, asked)
         return Response(answer, media_type="application/json")
     response = Response(media_type="application/json")
     job = await asyncio.to_thread(_submitted, request, asked, content)
@@ -84,17 +86,8 @@ async def read(request: Request, table_id: str) -> TableView:
 async def table(request: Request, table_id: str) -> Response:
     """The table's numbers as JSON, which says how to read them, or as a NumPy archive, by the Accept header."""
     media_type = accepted_of(request, ("application/json", *_NPZ))
-    service = state(request)
-    job = _jobs.found(service, "albedo_table", table_id)
-    if job.result is None:
-        raise ProblemError(
-            409, f"Expected the table to have succeeded, but it is {job.status}. Its numbers come when it has."
-        )
-    name, kind = json.loads(job.result)["hash"], "npz" if media_type in _NPZ else "json"
-    content = await asyncio.to_thread(tables.content, service.settings.data, name, kind)
-    if content is None:  # removed just now with another job that had made the same table
-        raise ProblemError(404, f"Expected the numbers of the table {table_id!r} to be kept. Post its request again.")
-    return Response(content, media_type=media_type, headers={"vary": "accept"})
+    kind: tables.Kind = "npz" if media_type in _NPZ else "json"
+    return await _jobs.kept_file(request, "albedo_table", table_id, tables.content, kind, media_type)
 
 
 @router.post("/{table_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 409, 422, *WRITES))
@@ -106,16 +99,7 @@ async def cancel(request: Request, table_id: str) -> TableView:
 @router.delete("/{table_id}", dependencies=_JSON, status_code=204, responses=responses(404, 406, 422, *WRITES))
 async def remove(request: Request, table_id: str) -> None:
     """Remove a table for good, cancelling it first where it is not finished."""
-    service = state(request)
-    job = await _jobs.removed(service, "albedo_table", table_id)
-    if job.result is not None:
-        await asyncio.to_thread(_forget, service, json.loads(job.result)["hash"])
-
-
-def _forget(service: State, name: str) -> None:
-    """Remove the numbers of a table, unless another job made the same."""
-    if not service.store.mentioned("albedo_table", name):
-        tables.remove(service.settings.data, name)
+    await _jobs.remove(state(request), "albedo_table", table_id, tables.remove)
 
 
 def _submitted(request: Request, asked: AlbedoRequest, content: bytes) -> Job:
@@ -128,7 +112,7 @@ def _values(asked: AlbedoRequest) -> str:
     material, theta_deg = material_of(asked.material), asked.theta_deg or []
     tolerance = _TOLERANCE if asked.tolerance is None else asked.tolerance
     most = next(count for least, count in _MOST_INTEGRALS.items() if tolerance >= least)
-    integrals = len(theta_deg) * len(material.form.terms)
+    integrals = (len(theta_deg) + _CERTIFYING * asked.certificate) * len(material.form.terms)
     if integrals > most or material.channels > _MOST_CHANNELS:
         raise ProblemError(
             422,
@@ -139,4 +123,7 @@ def _values(asked: AlbedoRequest) -> str:
     theta = torch.deg2rad(torch.tensor(theta_deg, dtype=torch.float64))
     with torch.no_grad():
         found = bc.albedo(material, theta, math.radians(asked.phi_deg), tolerance)
-    return json.dumps(described(material, theta_deg, asked.phi_deg, found), allow_nan=False)
+    view = described(material, theta_deg, asked.phi_deg, found)
+    if asked.certificate:
+        view["certificate"] = bc.certify(material).to_dict()
+    return json.dumps(view, allow_nan=False)

@@ -216,6 +216,26 @@ def test_a_narrow_and_a_wide_width_are_a_reference_too(text, theta, phi, monkeyp
     assert float((found.values - without.values).abs().max()) <= 1e-9
 
 
+def test_a_masking_that_is_smooth_but_not_analytic_is_a_reference_too():
+    """To 1e-12 where a lobe is narrow and wide at once: that takes 900 nodes on a ray, and no more than 500 rays."""
+    form, values = prepared("beckmann(separable, ks=0.5856, f0=0.8094, ax=0.0067736, ay=9.8129)")
+    found = bc.energy.of_form(form, values, torch.tensor(9.8855e-4).double(), torch.tensor(0.240949), 1e-12)
+    assert found.met, f"{float(found.error):.3e}"
+    assert found.evaluations < 5e6  # of 4e7 where more rays are to make up for too few nodes on them
+
+
+def test_rays_are_dense_where_they_can_be_at_the_horizon_itself():
+    """The wi whose masking changes is opposite to wo there to rounding, and has no half vector."""
+    form, values = prepared("ggx(anisotropic, ks=1, ax=0.05, ay=0.5)")
+    for co in (1e-8, 1e-10):
+        precise, plain = (
+            bc.energy.of_form(form, values, torch.tensor(co).double(), torch.tensor(0.0), tolerance)
+            for tolerance in (1e-12, 1e-7)
+        )
+        assert precise.met
+        assert float(precise.values) == pytest.approx(float(plain.values), abs=1e-7)
+
+
 @pytest.mark.parametrize("text", LOBES[1:6])
 def test_rays_agree_with_the_tests_own_disc(text):
     """The Cartesian slope-disc quadrature that the models' own tests trust, which meets a kink anywhere: 1e-5."""

@@ -122,6 +122,8 @@ def test_several_models_are_compared(client: Client) -> None:
     ranking = fit.comparison.ranking
     assert ranking[0].fit.model == fit.result.model
     assert {ranked.status for ranked in ranking} == {"converged", "undetermined"}
+    assert ranking[1].fit.model.encode() in fit.export("json", rank=2).content
+    assert fit.plot("albedo", "png", rank=2) != fit.plot("albedo", "png")
     (one,) = client.fits([measured_diffuser()], models=["lambert"])
     assert one.parameters["lambert.kd"] == pytest.approx(KD, rel=0.01)
     with pytest.raises(ProblemError, match="Expected either model or models to be given"):
@@ -306,6 +308,9 @@ def test_a_service_that_does_not_answer_is_named() -> None:
 
 def test_an_answer_of_another_service_is_told_apart() -> None:
     client = scripted(lambda request: httpx2.Response(502, text="<html>"))
+    foreign = scripted(lambda request: httpx2.Response(200, text="<p>It works!</p>"))
+    with foreign, pytest.raises(UnreachableError, match=r"Expected an answer of this service at http.*/v1/models, got"):
+        foreign.models()
     with client, pytest.raises(ProblemError, match=r"got status 502. Check the URL.") as refused:
         client.models()
     assert refused.value.status == 502
@@ -364,6 +369,10 @@ def test_a_material_is_evaluated_and_integrated(client: Client) -> None:
     wi, wo = (torch.tensor([w], dtype=torch.float64) for w in ([0.6, 0.0, 0.8], [0.0, 0.0, 1.0]))
     assert client.evaluate(material, wi=wi, wo=wo).f == material.f(wi, wo).tolist()
     found = client.albedo(material, np.array([0.0, 60.0]), phi_deg=10, tolerance=1e-3)
+    assert found.certificate is None
+    told = client.albedo(material, [0.0], certificate=True).certificate
+    assert told is not None
+    assert told.verdict == bc.certify(material).verdict
     theta = torch.deg2rad(torch.tensor([0.0, 60.0], dtype=torch.float64))
     own = bc.albedo(material, theta, tolerance=1e-3).values.tolist()
     assert found.values == [pytest.approx(row, rel=1e-9) for row in own]

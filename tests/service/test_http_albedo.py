@@ -15,6 +15,7 @@ from starlette.testclient import TestClient
 
 import brdfcore as bc
 from service.app import create_app
+from service.schemas import CertificateView
 from service.settings import Settings
 
 TEXT = "lambert(kd=[0.5, 0.2]) + ward_bounded(isotropic, rs=0.3, a=0.2)"
@@ -71,6 +72,17 @@ def test_values_are_the_librarys(http: TestClient, given: str) -> None:
     assert (found["material"], found["seconds"] > 0) == (str(material), True)
 
 
+@pytest.mark.parametrize("text", [TEXT, "kurt_eq_13", "lafortune(ks=1, cx=-2, cy=-2, n=1000000)"])
+def test_the_certificate_is_that_of_a_fit(http: TestClient, text: str) -> None:
+    """The last one's claimed error is infinite, which JSON holds as null."""
+    answer = http.post("/v1/albedo", json={"material": text, "theta_deg": [0.0], "tolerance": 0.1, "certificate": True})
+    assert answer.status_code == 200, answer.text
+    own = bc.certify(bc.material(text)).to_dict()
+    assert answer.json()["certificate"] == own | {"seconds": answer.json()["certificate"]["seconds"]}
+    assert CertificateView.model_validate(own).verdict == own["verdict"]
+    assert http.post("/v1/albedo", json=VALUES).json().get("certificate") is None
+
+
 def test_the_azimuth_counts(http: TestClient) -> None:
     body = {"material": "ward_bounded(rs=1, ax=0.1, ay=0.5)", "theta_deg": [85.0], "tolerance": 1e-3}
     along, across = (http.post("/v1/albedo", json=body | {"phi_deg": phi}).json()["values"] for phi in (0.0, 90.0))
@@ -118,6 +130,9 @@ def test_the_numbers_come_as_json_and_as_npz(
     file.write_bytes(as_npz.content)
     assert float(bc.AlbedoTable.load(file)(0.3, **{"oren_nayar.sigma": 0.5, "lambert.kd": 0.1})) > 0
     assert http.get(path, headers={"accept": "text/csv"}).status_code == 406
+    tag = http.get(path, headers={"accept": "application/x-npz"}).headers["etag"]
+    assert http.get(path, headers={"accept": "application/x-npz", "if-none-match": tag}).status_code == 304
+    assert http.get(path, headers={"if-none-match": tag}).status_code == 200, "as JSON it is another file"
 
 
 def test_the_same_table_is_not_made_twice(http: TestClient, settings: Settings) -> None:
@@ -142,10 +157,17 @@ def test_numbers_that_are_gone_are_a_problem(http: TestClient, settings: Setting
 
 
 def test_a_table_that_cannot_be_made_says_why(http: TestClient) -> None:
-    body = {"material": "ward(isotropic, rs=1)", "axes": {}, "tolerance": 0.01}
+    material = "lafortune(ks=1, cx=-2, cy=-2, n=1000000)"  # no number holds its albedo
+    body = {"material": material, "axes": {"theta_deg": [0, 86]}, "tolerance": 0.01}
     failed = http.post("/v1/albedo", json=body, headers={"prefer": "wait=20"}).json()
     assert (failed["status"], failed["result"]) == ("failed", None)
-    assert failed["error"].startswith("Expected the axis theta to end before the horizon")
+    assert failed["error"].startswith("Expected the albedo to be a finite number all over the table")
+
+
+def test_a_table_without_a_limit_is_not_accepted(idle: TestClient) -> None:
+    problem = idle.post("/v1/albedo", json={"material": "ward(isotropic, rs=1)", "axes": {}}).json()
+    assert problem["status"] == 422
+    assert problem["detail"].startswith("Expected the axis theta to end before the horizon for ward(isotropic)")
 
 
 def test_fits_and_tables_are_apart(idle: TestClient, request_body: dict[str, Any]) -> None:
@@ -180,6 +202,11 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "a loose tolerance": ({"tolerance": 0.5}, "tolerance", "less than or equal to 0.1"),
     "too many angles": ({"theta_deg": [1.0] * 501}, "theta_deg", "at most 1000 angles times terms"),
     "too many for the tolerance": ({"theta_deg": [1.0] * 51, "tolerance": 1e-9}, "theta_deg", "at most 100 angles"),
+    "too many terms to certify": (
+        {"material": " + ".join(["lambert(kd=0)"] * 21), "certificate": True},
+        "theta_deg",
+        "at most 1000 angles times terms",
+    ),
     "too many channels": ({"material": f"lambert(kd={[0.1] * 65})"}, "theta_deg", "64 channels"),
     "an unknown field": ({"theta": [1.0]}, "theta", "Remove it"),
 }
@@ -191,6 +218,7 @@ BAD_AXES: dict[str, tuple[dict[str, Any], str, str]] = {
     "a range outside the box": ({"axes": {"lambert.kd": [0.0, 2.0]}}, "axes", "within [0, 1]"),
     "a range of one number": ({"axes": {"lambert.kd": [0.5]}}, "axes.lambert.kd", "at least 2 items"),
     "a number as range": ({"axes": {"lambert.kd": 0.5}}, "axes.lambert.kd", "array, got 0.5"),
+    "a certificate of a table": ({"certificate": True}, "body", "Expected certificate to go with theta_deg"),
     "axes without names": ({"axes": ["lambert.kd"]}, "axes", "an object"),
 }
 
