@@ -132,11 +132,13 @@ def left_out(problem: Problem, x: Tensor, fold: Tensor) -> tuple[Tensor, Tensor]
 def typical(squares: Tensor, weights: Tensor, block: Tensor, least: float) -> float:
     """The geometric mean over the samples of their blocks' errors, each at least `least`, in the residual's unit.
 
-    It falls where the errors of most samples' blocks do. The root mean square is that of one block where none of the
-    others is like it, as the steepest incidence of a paint, which models then miss by as much as chance has it.
+    Samples of weight 0 do not count. It falls where the errors of most samples' blocks do. The root mean square is that
+    of one block where none of the others is like it, as the steepest incidence of a paint, which models then miss by as
+    much as chance has it.
     """
     errors = _mean(squares, weights, block).sqrt().clamp(min=least)
-    return float((block.bincount() / len(block) * errors.log()).sum().exp())
+    counts = block.bincount((weights > 0).to(weights))
+    return float((counts / counts.sum() * errors.log())[counts > 0].sum().exp())
 
 
 def _squares(problem: Problem, x: Tensor, row: Tensor) -> Tensor:

@@ -149,5 +149,9 @@ def test_the_typical_error_is_a_geometric_mean_that_no_block_decides() -> None:
     more = torch.cat([squares, torch.tensor([3e6, 0.0, 0.0]).double()])
     found = typical(more, torch.ones(7, dtype=torch.float64), torch.tensor([0, 0, 1, 1, 2, 2, 2]), 0.0)
     assert found == pytest.approx(4 ** (2 / 7) * 1000 ** (3 / 7))
+    half = torch.tensor([1, 1, 1, 0, 0, 0]).double()  # a block without weight, and a sample without
+    assert typical(torch.cat([squares[:3], half[3:]]), half, torch.tensor([0, 0, 1, 1, 2, 2]), 0.0) == pytest.approx(
+        10 ** (1 / 6)
+    )
     assert typical(torch.zeros(4).double(), weights, block, 0.0) == 0
     assert typical(0 * squares + torch.tensor([2.0, 0, 0, 0]), weights, block, 0.25) == pytest.approx(0.5)
