@@ -178,6 +178,19 @@ def test_the_materials_of_a_ladder_are_compared_at_one_scale() -> None:
     assert fit.ladder[0].error == pytest.approx(math.sqrt(lambert.objective / len(samples)), rel=1e-6)
 
 
+@pytest.mark.full
+@pytest.mark.parametrize("noise", [0.003, 0.0])
+def test_auto_sees_past_outliers(noise: float) -> None:
+    """A fifth reads ten times too high; without noise, a shape that fits exactly must not make all others outliers."""
+    good = measured_from(TRUE, noise=noise)
+    values = good.values.clone()
+    values[::5] *= 10 if noise else 1
+    fit = bc.fit(bc.Samples(good.wi, good.wo, values), "auto", robust="cauchy")
+    assert set(fit.parameters) >= {"lambert.kd"}
+    assert len(fit.parameters) > 1
+    assert float(fit.parameters["lambert.kd"]) == pytest.approx(0.2, rel=0.08)
+
+
 def test_energy_is_conserved_at_the_scale_of_the_free_fit() -> None:
     samples = measured_from("lambert(kd=0.1) + kurt(isotropic, ks=0.5, f0=0.3, m=0.2, alpha=0.3)", noise=0.003)
     free = bc.fit(samples, "lambert + kurt(isotropic)", robust="cauchy")
