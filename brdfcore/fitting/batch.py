@@ -67,4 +67,6 @@ def _alike(samples: Samples) -> object:
             field="samples",
         )
     directions = tuple(hash(each.numpy().tobytes()) for each in (samples.wi, samples.wo))
-    return *directions, samples.values.shape, samples.azimuth_observed, samples.sigma is None
+    known = samples.sigma is not None
+    weighs = known and samples.weight is None  # sigma does, where no weight takes its place
+    return *directions, samples.values.shape, samples.channels, samples.azimuth_observed, known, weighs
