@@ -122,9 +122,8 @@ def test_one_direction_determines_a_sum() -> None:
     assert "one by one, only together" in fit.message
     alone = bc.fit(CASES["one direction"][0], "lambert")
     assert alone.status == "converged"
-    assert float(alone.parameters["lambert.kd"]) == pytest.approx(math.pi * float(RANDOM.mean()), rel=1e-9) or float(
-        alone.parameters["lambert.kd"]
-    ) == pytest.approx(1)
+    assert float(RANDOM.mean()) > 1 / math.pi
+    assert float(alone.parameters["lambert.kd"]) == 1, "the mean of the values is above that of a white surface"
 
 
 @pytest.mark.parametrize("name", ["chassis", "solar_array"])
