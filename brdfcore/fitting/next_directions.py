@@ -28,7 +28,8 @@ from ..formats.samples import Samples, angles
 from ..geometry import from_angles
 from .criterion import spread
 from .data import Data
-from .limits import check_max_theta
+from .given import plain, whole
+from .limits import check_angle
 from .losses import LOSSES
 from .plan import Plan
 from .problem import Problem
@@ -82,9 +83,14 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
 
     Raises ParameterError for a count below 1, an angle out of range, or a fit without a free value.
     """
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+    if not isinstance(fit, Fit):
+        raise ParameterError(
+            f"Expected fit to be a Fit, got {type(fit).__name__}. Pass what bc.fit returned.", field="fit"
+        )
+    wanted, max_theta = whole(count), plain(max_theta)
+    if wanted is None or wanted < 1:
         raise ParameterError(f"Expected count to be a whole number from 1 on, got {count!r}. Use 10.", field="count")
-    check_max_theta(max_theta)
+    check_angle(max_theta)
     plan = Plan(fit.form, fit.values, frozenset(fit.fixed), frozenset(fit.gray), frozenset(fit.per_channel), ())
     problem = Problem(plan, fit.samples, LOSSES[fit.loss])
     x = problem.pack(fit.values).unsqueeze(0)
@@ -97,7 +103,7 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
     thin = max(1, math.ceil(len(wi) * problem.size**3 / _WORK))
     wi, wo = wi[::thin], wo[::thin]
     columns, variance = design.candidates(wi, wo)
-    chosen = _exchanged(design, columns, variance, min(count, len(wi)))
+    chosen = _exchanged(design, columns, variance, min(wanted, len(wi)))
     before = design.covariance(design.a, design.b)
     a, b = design.with_(columns[chosen], variance[chosen])
     after = design.covariance(a.sum(0) + design.a, b.sum(0) + design.b)
