@@ -83,11 +83,11 @@ class Settings:
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ, **given: Any) -> "Settings":
-        """The settings of the environment, except where an argument other than None is given."""
+        """The settings of the variables that are not empty, except where an argument other than None is given."""
         values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
         for setting in fields(cls):
             text = environment.get(f"BRDF_{setting.name.upper()}")
-            if text is not None and setting.name not in values:
+            if text and setting.name not in values:
                 read = setting.metadata.get("read")
                 values[setting.name] = read(text) if read else _converted(setting.name, setting.type, text)
         return cls(**values)

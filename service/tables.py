@@ -5,7 +5,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import brdfcore as bc
 from brdfcore.energy._described import axes_in_radians
@@ -14,6 +14,7 @@ from brdfcore.energy.tables import Range, check
 from .materials import material_of
 from .schemas import AlbedoRequest
 
+Kind = Literal["npz", "json"]
 _TOLERANCE = 1e-4  # where a request states none
 _ANGLES = ("theta", "phi")
 
@@ -43,7 +44,7 @@ def made(asked: AlbedoRequest, data: Path, progress: Callable[[float], None]) ->
     }
 
 
-def content(data: Path, name: str, kind: str) -> bytes | None:
+def content(data: Path, name: str, kind: Kind) -> bytes | None:
     """A kept table as the bytes of an npz or JSON file; None where there is none."""
     path = _path(data, name)
     try:

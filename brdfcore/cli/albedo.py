@@ -23,8 +23,12 @@ THETA_DEG = "0,30,60,75,85,89,89.9"
 
 def command(
     material: Annotated[str, typer.Argument(help="A material's text or a preset's name.", show_default=False)],
-    theta_deg: Annotated[str, typer.Option(help="Polar angles, separated by commas.")] = THETA_DEG,
-    phi_deg: Annotated[float, typer.Option(help="Azimuth, which an anisotropic material depends on.")] = 0.0,
+    theta_deg: Annotated[
+        str | None, typer.Option(help="Polar angles, separated by commas.", show_default=THETA_DEG)
+    ] = None,
+    phi_deg: Annotated[
+        float | None, typer.Option(help="Azimuth, which an anisotropic material depends on.", show_default="0")
+    ] = None,
     tolerance: Annotated[
         float | None, typer.Option(help="Largest error; by default 1e-6, and 1e-4 for a table.", show_default=False)
     ] = None,
@@ -49,9 +53,21 @@ def command(
         bc.plots.kind_of(plot)
     if axis and table is None:
         raise InvalidValueError("Expected --axis to go with --table, got no file. Add --table OUT.npz.", field="axis")
+    if table is not None and theta_deg is not None:
+        raise InvalidValueError(
+            f"Expected --theta-deg to go without --table, which holds all angles, got {theta_deg!r}. Leave it out, or "
+            "give the table's range as --axis theta_deg=0:85.",
+            field="theta_deg",
+        )
+    if table is not None and phi_deg is not None and plot is None:
+        raise InvalidValueError(
+            f"Expected --phi-deg to go without --table, which holds every azimuth, got {phi_deg:g}. Leave it out.",
+            field="phi_deg",
+        )
+    phi_deg = 0.0 if phi_deg is None else phi_deg
     made = bc.material(material)
     if table is None:
-        angles = _numbers(theta_deg)
+        angles = _numbers(THETA_DEG if theta_deg is None else theta_deg)
         found = _albedo(made, angles, phi_deg, 1e-6 if tolerance is None else tolerance)
         if as_json:
             typer.echo(json.dumps(described(made, angles, phi_deg, found), indent=2, allow_nan=False))

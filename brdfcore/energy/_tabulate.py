@@ -26,7 +26,8 @@ from ..models.material import Material
 from . import _axes, _chebyshev
 from ._axes import LOWEST, PHI, Axis
 from .albedo import of_form
-from .probe import pairs, symmetry
+from .probe import growth, pairs, symmetry
+from .scan import lone_terms
 
 MOST = 2**20  # numbers in a table
 LONGEST = 257  # nodes along a line
@@ -37,6 +38,7 @@ QUADRATURE = 0.1  # of the tolerance, for each value
 LINES = 0.05  # of an axis's share, for each value on a line: the coefficients of n random errors add up to sqrt(2 n)
 BLOCK = 1024  # rows between two words of progress
 SEED = 20100629
+_ANGLES = ("theta", "phi")
 
 Rows = Mapping[str, Tensor]  # axis -> values, all of one length; of phi they are phi'
 
@@ -69,7 +71,7 @@ class Quadrature:
             if "phi" in block:
                 factor = _axes.stretch(self.ratios, self.form, self.fixed | block)
                 azimuth = torch.atan2(torch.sin(block["phi"]) * factor, torch.cos(block["phi"]))
-            shapes = {key: value[:, None] for key, value in block.items() if key not in ("theta", "phi")}
+            shapes = {key: value[:, None] for key, value in block.items() if key not in _ANGLES}
             with torch.no_grad():
                 albedo = of_form(self.form, self.fixed | side_by_side | shapes, co, azimuth, tolerance)
             self.evaluations += albedo.evaluations
@@ -93,12 +95,8 @@ def tabulate(
 ) -> dict[str, Any]:
     """The fields of the table, for axes without phi: it is added here where the material is anisotropic."""
     start = time.perf_counter()
-    form = material.form
-    fixed = {key: value.detach().double() for key, value in material.values().items()}
-    quadrature = Quadrature(form, fixed, material.channels, progress or (lambda fraction: None))
-    unread = _unread(form, fixed, [axis.name for axis in chosen[1:]])
-    axes = (chosen[0], *((PHI,) if _anisotropic(form, fixed, chosen[1:]) else ()), *chosen[1:])
-    work = _Work(axes, unread, quadrature, tolerance, torch.Generator().manual_seed(SEED))
+    work = _work(material, chosen, tolerance, progress)
+    axes, quadrature, unread = work.axes, work.quadrature, work.unread
     work.require_end()
     # what counting leaves to each axis; along what no basis reads there is hardly an error
     counts, share = {}, tolerance / (2 * (len(axes) - len(unread)))
@@ -128,6 +126,29 @@ def tabulate(
         "evaluations": quadrature.evaluations,
         "seconds": time.perf_counter() - start,
     }
+
+
+def require_end(material: Material, chosen: tuple[Axis, ...], tolerance: float) -> None:
+    """Raise what `tabulate` would of a theta without an end, where the growth of a term's own values foretells it.
+
+    That takes a few milliseconds, and an integral only where a term grows.
+    """
+    if chosen[0].high == math.pi / 2:
+        work = _work(material, chosen, tolerance, None)
+        if work.grows():
+            work.require_end()
+
+
+def _work(
+    material: Material, chosen: tuple[Axis, ...], tolerance: float, progress: Callable[[float], None] | None
+) -> "_Work":
+    """The steps of making a table, for axes without phi."""
+    form = material.form
+    fixed = {key: value.detach().double() for key, value in material.values().items()}
+    quadrature = Quadrature(form, fixed, material.channels, progress or (lambda fraction: None))
+    axes = (chosen[0], *((PHI,) if _anisotropic(form, fixed, chosen[1:]) else ()), *chosen[1:])
+    unread = _unread(form, fixed, [axis.name for axis in chosen[1:]])
+    return _Work(axes, unread, quadrature, tolerance, torch.Generator().manual_seed(SEED))
 
 
 def _unread(form: Form, fixed: dict[str, Tensor], keys: list[str]) -> frozenset[str]:
@@ -178,6 +199,14 @@ class _Work:
         """The axes that make rows, and those that go side by side."""
         return [a for a in self.axes if a.name not in self.unread], [a for a in self.axes if a.name in self.unread]
 
+    def grows(self) -> bool:
+        """Whether at some corner of the box the values of a term grow towards grazing."""
+        form, fixed = self.quadrature.form, self.quadrature.fixed
+        points = self.points([axis for axis in self.axes if axis.name not in _ANGLES], 8, 0)
+        count = max((len(p) for p in points.values()), default=1)
+        corners = (fixed | {name: p[k] for name, p in points.items()} for k in range(count))
+        return any((growth(lone.form, lone.values) or 0) > 0 for at in corners for lone in lone_terms(form, at))
+
     def require_end(self) -> None:
         """Raise where theta has no end and the albedo does not settle towards the horizon."""
         theta = self.axes[0]
@@ -196,7 +225,7 @@ class _Work:
         if bool(((nearest - near).abs() > allowed).any()):
             raise InvalidValueError(
                 f"Expected the axis theta to end before the horizon for {self.quadrature.form.text()}, since its "
-                "albedo grows without bound towards it, got no end. Give it one, such as 1.5 (86 degrees).",
+                "albedo grows without bound towards it, got no end. Give it one, such as 1.5 (86 for theta_deg).",
                 field="axes",
             )
 

@@ -112,7 +112,7 @@ class Certificate:
 
 
 def certify(material: Material, tolerance: float = 1e-6) -> Certificate:
-    """The certificate of a material, its largest albedo claimed to the tolerance [1] wherever that can be met.
+    """The certificate of a material, its largest albedo a claimed to tolerance * max(1, a) [1] where that can be met.
 
     Every term is integrated alone, over as many azimuths as its symmetry leaves to see. Raises InvalidValueError for
     what is no material, and for a tolerance that is not in (0, 0.1].

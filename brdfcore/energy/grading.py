@@ -171,6 +171,11 @@ class Circle:
     def _set_narrow_axis(self) -> Tensor:
         """Set the first map, which is dense at the narrow axis, and return its slope where T d.u = 0."""
         narrow, wide = torch.minimum(self.wx, self.wy), torch.maximum(self.wx, self.wy)
+        # In the angle t the lobe's own fall is even. What is not changes within a strip about the narrow axis, whose
+        # width is the map's scale. Azimuths, by which tails and kinks act, turn within narrow / wide. Smith's masking
+        # follows azimuths more finely, by 1 / wide, where slopes exceed 1; without a tail it is as good as even where
+        # they do not. What other lobes have left are powers of 1 + r^2, which change within 1 / wide, or within
+        # narrow / wide where every slope exceeds 1.
         ratio, beyond = narrow / wide, 1 / wide.clamp(min=1.0)
         if self.profile.fall == "algebraic":
             scale = ratio * beyond

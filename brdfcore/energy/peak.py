@@ -15,7 +15,6 @@ from .patch import ALONE, DEAREST, DENSE, Patch, Peak, grid, largest, largest_in
 from .scan import Scan, theta_of
 
 MIDDLE = 1e-4  # tolerance between the scan's and the caller's
-PATCHES = 4  # before what is left of doubt counts as error
 SPARE = 2.0  # how much higher than a parabola through its neighbours a top between the scan's points may be
 
 
@@ -38,50 +37,49 @@ def refined(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tup
         albedo, error, channel = (table[row, column].item() for table in (over, doubt, channels))
         return Peak(albedo, error, float(scan.u[row]), float(scan.s[column]), int(channel))
 
-    _, column = _first(over[-1:], tolerance, scan)
-    end = _patch(scan, len(scan.u) - 1, column)
-    low, last = _ends(scan, end, tolerance)
-    last = last._replace(error=last.error + abs(last.albedo - low.albedo))
+    end = _patch(scan, len(scan.u) - 1, _first(over[-1:], tolerance, scan)[1])
     best = point(*_first(over, tolerance, scan))
     reach = over + SPARE * _rises(over)
-    for _ in range(PATCHES):
-        if float(reach.max()) <= max(best.albedo, last.albedo) + tolerance / 2 or scan.evaluations > DEAREST:
-            break
+    # a limit that cannot be the largest comes last: it may take all that may be spent
+    last = _limit(scan, end, tolerance) if float(reach[-1].max()) >= best.albedo - tolerance else None
+    known = best.albedo if last is None else last.albedo
+    # as many patches as it takes: a level albedo has a doubtful edge at each of its azimuths
+    while float(reach.max()) > max(best.albedo, known) + tolerance / 2 and scan.evaluations <= DEAREST:
         patch = _patch(scan, *_first(reach, tolerance, scan))
         best = max(best, largest(scan, patch, tolerance), key=lambda peak: peak.albedo)
         reach[patch.covers(scan)] = -math.inf
-    left = float(reach.max()) - max(best.albedo, last.albedo)
+    left = float(reach.max()) - max(best.albedo, known)
     best = best._replace(error=best.error + max(left, 0.0))
     level = (over >= best.albedo - tolerance / 4) & (doubt < tolerance) & (scan.u < best.u).unsqueeze(-1)
     if bool(level.any()):
         earlier = point(*largest_index(level.to(torch.int8)))
         best = best._replace(u=earlier.u, s=earlier.s, channel=earlier.channel)
-    return best, last
+    return best, last or _limit(scan, end, tolerance)
 
 
-def _ends(scan: Scan, end: Patch, tolerance: float) -> tuple[Peak, Peak]:
-    """The largest albedos of the last two rows over a patch of azimuths; where there is but one, in one call."""
+def _limit(scan: Scan, end: Patch, tolerance: float) -> Peak:
+    """The largest albedo of the last row over a patch of azimuths, in whose error is what the row before it lacks."""
     if end.half_s > 0:
-        low, last = (largest(scan, end._replace(u=u, half_u=0.0), tolerance) for u in scan.u[-2:].tolist())
-        return low, last
-    parts, errors = scan.albedos(scan.u[-2:], torch.full_like(scan.u[-2:], end.s), tolerance / 4)
-    found, error = parts.sum(0), errors.sum(0).amax(1)
-    low, last = (
-        Peak(float(row.max()), float(doubt), float(u), end.s, int(row.argmax()))
-        for row, doubt, u in zip(found, error, scan.u[-2:], strict=True)
-    )
-    return low, last
+        last = largest(scan, end._replace(u=float(scan.u[-1]), half_u=0.0), tolerance)
+        parts, _ = scan.albedos(scan.u[-2:-1], scan.u.new_tensor([last.s]), tolerance / 4)
+        low = float(parts.sum(0).max())
+    else:  # both rows in one call
+        parts, errors = scan.albedos(scan.u[-2:], torch.full_like(scan.u[-2:], end.s), tolerance / 4)
+        (before, found), error = parts.sum(0), float(errors.sum(0)[1].max())
+        low, last = float(before.max()), Peak(float(found.max()), error, float(scan.u[-1]), end.s, int(found.argmax()))
+    return last._replace(error=last.error + abs(last.albedo - low))
 
 
 def _settled(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tuple[Tensor, Tensor, Tensor]:
     """The largest of a scan (U, S, C) over its channels, its error, and the channel, (U, S) each.
 
-    To a quarter of the tolerance in the last row, and wherever the albedo may be the largest.
+    To a quarter of the tolerance wherever the albedo may be the largest of all, or of the last row.
     """
     (over, channel), doubt = total.max(-1), claimed.amax(-1)
     for asked in (MIDDLE, tolerance / 4):
-        unsure = over + doubt + SPARE * _rises(over) > (over - doubt).max()
-        unsure[-1] = True
+        above, below = over + doubt + SPARE * _rises(over), over - doubt
+        unsure = above > below.max()
+        unsure[-1] = above[-1] > below[-1].max()
         unsure &= doubt > asked
         u, s = (x[unsure] for x in torch.meshgrid(scan.u, scan.s, indexing="ij"))
         if len(u):

@@ -91,10 +91,11 @@ class Scan:
         """Each term's albedo [1] at pairs of u and s (N,), and the error claimed for it: (T, N, C) each."""
         parts, errors = [], []
         for form, values, reflectance, its in self.terms:
-            at, inverse = torch.unique(u, return_inverse=True) if its.isotropic else (u, slice(None))
-            azimuth = u.new_zeros(1) if its.isotropic else azimuth_of(s)
+            # one direction for every azimuth where they are alike: of an isotropic term, and at the normal
+            azimuth = torch.zeros_like(u) if its.isotropic else torch.where(u > 0, azimuth_of(s), 0.0)
+            at, inverse = torch.unique(torch.stack([u, azimuth]), dim=1, return_inverse=True)
             allowed = min(tolerance / len(self.terms) / max(reflectance, 1e-300), WEAKEST)
-            found = of_form(form, values, 1 / torch.cosh(at), azimuth, allowed)
+            found = of_form(form, values, 1 / torch.cosh(at[0]), at[1], allowed)
             self.evaluations += found.evaluations
             parts.append(reflectance * found.values[inverse].expand(-1, self.channels))
             errors.append(reflectance * found.error[inverse].expand(-1, self.channels))

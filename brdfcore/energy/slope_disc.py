@@ -67,8 +67,9 @@ class SlopeDisc(Integral):
         super().__init__(model, place, rows, error)
         self.profile = PROFILES[model.name]
         self.two = anisotropic(model)
-        # Beckmann's masking is smooth, but not analytic, at wi = n: that takes many nodes
-        self.last = LADDER.index(2048), LADDER.index(768)
+        # Beckmann's masking is smooth, but not analytic, at wi = n: where a lobe is narrow and wide at once, to claim
+        # 1e-12 takes 900 nodes on a ray, and more rays do not make up for fewer
+        self.last = LADDER.index(2048), LADDER.index(1024)
         self.pieces = {"none": 1, "equal": 2, "grooves": 3}[self.profile.kink]  # into which kinks part a ray
         with torch.no_grad():
             self.circle = Circle(self.profile, rows, slope_widths(model, self.place), self.two, error)

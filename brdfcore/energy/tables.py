@@ -32,7 +32,7 @@ from ..errors import BrdfError, InvalidValueError, unknown_name
 from ..models.material import Material, material
 from . import _axes, _chebyshev, _table_files
 from ._axes import Axis
-from ._tabulate import tabulate
+from ._tabulate import require_end, tabulate
 
 Range = tuple[float, float] | None
 
@@ -192,7 +192,7 @@ def albedo_table(
 
 
 def check(made: Material, axes: Mapping[str, Range] | None, tolerance: float) -> tuple[Axis, ...]:
-    """The axes that were asked for, theta first; raises what `albedo_table` would raise before it computes."""
+    """The axes that were asked for, theta first; raises what `albedo_table` would raise before it makes the table."""
     if not 1e-12 <= tolerance <= 0.1:
         raise InvalidValueError(
             f"Expected tolerance to be within [1e-12, 0.1], got {tolerance:g}. It is the largest error of an albedo.",
@@ -206,7 +206,9 @@ def check(made: Material, axes: Mapping[str, Range] | None, tolerance: float) ->
             field="axes",
         )
     keys = [key for key in asked if key not in ("theta", "phi")]
-    return (_axes.of_theta(asked.get("theta")), *(_axes.of_parameter(made.form, key, asked[key]) for key in keys))
+    chosen = (_axes.of_theta(asked.get("theta")), *(_axes.of_parameter(made.form, key, asked[key]) for key in keys))
+    require_end(made, chosen, tolerance)
+    return chosen
 
 
 def _hash(made: Material, axes: tuple[Axis, ...], tolerance: float) -> str:

@@ -8,10 +8,10 @@ from collections.abc import Callable, Coroutine, Generator
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from ..schemas import FINISHED, JobView, ProgressView
-from .errors import JobFailedError, WaitError
+from .errors import JobFailedError, UnreachableError, WaitError
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,15 @@ class Start(Protocol):
 
 
 def read(view: type[_View], method: str, path: str, **what: Any) -> Call[_View]:
-    """What the service answers, as a view."""
+    """What the service answers, as a view; UnreachableError where something else answers."""
     answer = yield Ask(method, path, what)
-    return view.model_validate_json(answer.content)
+    try:
+        return view.model_validate_json(answer.content)
+    except ValidationError:
+        raise UnreachableError(
+            f"Expected an answer of this service at {answer.url}, got something else. Check the URL, and that client "
+            "and service are of one version."
+        ) from None
 
 
 def answered(method: str, path: str, **what: Any) -> Call[Any]:

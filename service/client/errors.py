@@ -1,7 +1,7 @@
 """What the client raises on purpose.
 
 ClientError
-|-- UnreachableError            no answer at all
+|-- UnreachableError            no answer at all, or not one of this service
 |-- ProblemError                the service refused, in its own sentence: .status .detail .field .errors
 |-- JobFailedError              the job was accepted and has failed or was cancelled
 |   `-- FitFailedError          and it was a fit
@@ -18,7 +18,7 @@ class ClientError(Exception):
 
 
 class UnreachableError(ClientError):
-    """The service did not answer."""
+    """Nothing answered at the URL, or something that is no such service."""
 
 
 class ProblemError(ClientError):

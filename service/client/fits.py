@@ -29,6 +29,7 @@ class PlotOptions(TypedDict, total=False):
     theta_i_deg: Sequence[float] | None
     phi_deg: float | None
     channel: str | None
+    rank: int  # of the model, where several were compared; 1 is the best
 
 
 class _Fit(Job[FitView]):
@@ -102,8 +103,8 @@ class _Fit(Job[FitView]):
         given: Any = {key: value for key, value in asked.items() if value is not None}
         return (yield from content("GET", f"{self._path}/{self.id}/plots/{name}.{kind}", params=given))
 
-    def _exported(self, name: str) -> Call[ExportedFile]:
-        answer = yield from answered("GET", f"{self._path}/{self.id}/export/{name}")
+    def _exported(self, name: str, rank: int) -> Call[ExportedFile]:
+        answer = yield from answered("GET", f"{self._path}/{self.id}/export/{name}", params={"rank": rank})
         difference = float(answer.headers["x-brdf-difference"])
         return ExportedFile(bytes(answer.content), difference, answer.headers["x-brdf-holds"])
 
@@ -115,9 +116,9 @@ class FitResult(_Fit, Waiting[FitView, ProgressView]):
         """The plot of that name (lobes, albedo or residuals), as the bytes of an SVG or PNG file."""
         return self._run(self._drawn(name, kind, asked))
 
-    def export(self, format: str) -> ExportedFile:  # noqa: A002 - the name that the library and the service use
-        """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json."""
-        return self._run(self._exported(format))
+    def export(self, format: str, *, rank: int = 1) -> ExportedFile:  # noqa: A002 - the name that the library uses
+        """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json; of several, the rank's."""
+        return self._run(self._exported(format, rank))
 
 
 class AsyncFitResult(_Fit, Awaited[FitView, ProgressView]):
@@ -127,6 +128,6 @@ class AsyncFitResult(_Fit, Awaited[FitView, ProgressView]):
         """The plot of that name (lobes, albedo or residuals), as the bytes of an SVG or PNG file."""
         return await self._run(self._drawn(name, kind, asked))
 
-    async def export(self, format: str) -> ExportedFile:  # noqa: A002 - the name that the library and the service use
-        """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json."""
-        return await self._run(self._exported(format))
+    async def export(self, format: str, *, rank: int = 1) -> ExportedFile:  # noqa: A002 - the name that the library uses
+        """The fitted material as a file for radiance, mitsuba, brdf_explorer, merl or json; of several, the rank's."""
+        return await self._run(self._exported(format, rank))

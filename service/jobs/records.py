@@ -116,10 +116,18 @@ class Attempt:
 
 
 def connect(path: Path) -> sqlite3.Connection:
-    """A connection for any thread, whose commits are on disk."""
-    db = sqlite3.connect(path, timeout=5.0, isolation_level=None, check_same_thread=False)
-    db.execute("PRAGMA journal_mode = WAL")
-    db.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
+    """A connection for any thread, whose commits are on disk; InvalidValueError where that file cannot be one."""
+    try:
+        db = sqlite3.connect(path, timeout=5.0, isolation_level=None, check_same_thread=False)
+        db.execute("PRAGMA journal_mode = WAL")
+        db.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
+    except sqlite3.DatabaseError as error:
+        if error.sqlite_errorcode not in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY):
+            raise
+        raise InvalidValueError(
+            f"Expected {path} to be a job store that can be written, got: {error}. Choose another data folder.",
+            field="data",
+        ) from error
     return db
 
 

@@ -8,7 +8,8 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 from fastapi import Request, Response
 from pydantic import BaseModel, ConfigDict, Field
@@ -20,8 +21,10 @@ from ..errors import ProblemError
 from ..jobs.records import BrokenPromiseError, Job, Promise, QueueFullError
 from ..schemas import FINISHED, FitOutcome, JobKind, JobStatus
 from ..state import State, state
+from ._http import unchanged
 
 _LONGEST_WAIT = 60.0  # [s]
+_Suffix = TypeVar("_Suffix", bound=str)
 _NAME: dict[JobKind, str] = {"fit": "fit", "albedo_table": "table of albedos", "render": "render"}
 _PATH: dict[JobKind, str] = {"fit": "/v1/fits", "albedo_table": "/v1/albedo", "render": "/v1/renders"}
 
@@ -155,14 +158,50 @@ async def cancelled(service: State, kind: JobKind, job_id: str) -> Job:
     return job
 
 
-async def removed(service: State, kind: JobKind, job_id: str) -> Job:
-    """The job as it was before it was removed for good."""
+async def remove(service: State, kind: JobKind, job_id: str, files: Callable[[Path, str], None] | None = None) -> None:
+    """Remove the job for good and, with `files`, what it has on disk under a hash unless another job made the same."""
     found(service, kind, job_id)
     job = await asyncio.to_thread(service.store.delete, job_id)  # with the result that came since
     if job is None:
         raise absent(kind, job_id)
     service.dispatcher.wake()
-    return job
+    if files is not None and job.result is not None:
+        name = json.loads(job.result)["hash"]
+        if not await asyncio.to_thread(service.store.mentioned, kind, name):
+            await asyncio.to_thread(files, service.settings.data, name)
+
+
+def result_of(job: Job) -> str:
+    """The result of a job as JSON; 409 where it has none."""
+    if job.result is None:
+        raise ProblemError(
+            409,
+            f"Expected the {_NAME[job.kind]} to have succeeded, but it is {job.status}. "
+            "Only then is there something to send.",
+        )
+    return job.result
+
+
+async def kept_file(
+    request: Request,
+    kind: JobKind,
+    job_id: str,
+    read: Callable[[Path, str, _Suffix], bytes | None],
+    suffix: _Suffix,
+    media_type: str,
+) -> Response:
+    """What a job has on disk under a hash, as `read` gives it; 304 where the client has it."""
+    service = state(request)
+    name = json.loads(result_of(found(service, kind, job_id)))["hash"]
+    headers = {"etag": f'"{name[:32]}-{suffix}"', "cache-control": "private, no-cache", "vary": "accept"}
+    if unchanged(request, headers["etag"]):
+        return Response(status_code=304, headers=headers)
+    content = await asyncio.to_thread(read, service.settings.data, name, suffix)
+    if content is None:  # removed just now with another job that had made the same
+        raise ProblemError(
+            404, f"Expected what the {_NAME[kind]} {job_id!r} has made to be kept. Post its request again."
+        )
+    return Response(content, headers=headers, media_type=media_type)
 
 
 def summary(job: Job) -> dict[str, Any]:

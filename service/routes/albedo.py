@@ -16,7 +16,7 @@ from ..errors import WRITES, ProblemError, inlined, responses
 from ..jobs.records import Job
 from ..materials import material_of
 from ..schemas import AlbedoRequest, AlbedoView, TablePage, TableSummary, TableView
-from ..state import State, state
+from ..state import state
 from . import _jobs
 from ._http import accepted_of, json_accepted, json_content, parsed
 
@@ -84,17 +84,8 @@ async def read(request: Request, table_id: str) -> TableView:
 async def table(request: Request, table_id: str) -> Response:
     """The table's numbers as JSON, which says how to read them, or as a NumPy archive, by the Accept header."""
     media_type = accepted_of(request, ("application/json", *_NPZ))
-    service = state(request)
-    job = _jobs.found(service, "albedo_table", table_id)
-    if job.result is None:
-        raise ProblemError(
-            409, f"Expected the table to have succeeded, but it is {job.status}. Its numbers come when it has."
-        )
-    name, kind = json.loads(job.result)["hash"], "npz" if media_type in _NPZ else "json"
-    content = await asyncio.to_thread(tables.content, service.settings.data, name, kind)
-    if content is None:  # removed just now with another job that had made the same table
-        raise ProblemError(404, f"Expected the numbers of the table {table_id!r} to be kept. Post its request again.")
-    return Response(content, media_type=media_type, headers={"vary": "accept"})
+    kind: tables.Kind = "npz" if media_type in _NPZ else "json"
+    return await _jobs.kept_file(request, "albedo_table", table_id, tables.content, kind, media_type)
 
 
 @router.post("/{table_id}/cancel", dependencies=_JSON, responses=responses(404, 406, 409, 422, *WRITES))
@@ -106,16 +97,7 @@ async def cancel(request: Request, table_id: str) -> TableView:
 @router.delete("/{table_id}", dependencies=_JSON, status_code=204, responses=responses(404, 406, 422, *WRITES))
 async def remove(request: Request, table_id: str) -> None:
     """Remove a table for good, cancelling it first where it is not finished."""
-    service = state(request)
-    job = await _jobs.removed(service, "albedo_table", table_id)
-    if job.result is not None:
-        await asyncio.to_thread(_forget, service, json.loads(job.result)["hash"])
-
-
-def _forget(service: State, name: str) -> None:
-    """Remove the numbers of a table, unless another job made the same."""
-    if not service.store.mentioned("albedo_table", name):
-        tables.remove(service.settings.data, name)
+    await _jobs.remove(state(request), "albedo_table", table_id, tables.remove)
 
 
 def _submitted(request: Request, asked: AlbedoRequest, content: bytes) -> Job:

@@ -9,10 +9,10 @@ import brdfcore as bc
 from brdfcore.errors import unknown_name
 from brdfcore.exports import EXPORTS, Export
 
-from ..errors import ProblemError, responses
+from ..errors import responses
 from ..state import state
 from ._http import require_accepted
-from ._jobs import Ranked, found, outcome_of
+from ._jobs import Ranked, found, outcome_of, result_of
 
 router = APIRouter(prefix="/v1/fits/{fit_id}/export", tags=["exports"])
 
@@ -42,15 +42,8 @@ async def export(
     exporter = EXPORTS[format]
     require_accepted(request, exporter.media_type)
     service = state(request)
-    job = found(service, "fit", fit_id)
-    if job.result is None:
-        raise ProblemError(
-            409,
-            f"Expected the fit to have succeeded, but it is {job.status}. An export needs a fit that has succeeded.",
-        )
-    made = await asyncio.get_running_loop().run_in_executor(
-        service.computing, _exported, job.result, asked.rank, format
-    )
+    result = result_of(found(service, "fit", fit_id))
+    made = await asyncio.get_running_loop().run_in_executor(service.computing, _exported, result, asked.rank, format)
     headers = {
         "content-disposition": f'attachment; filename="fit_{fit_id}{exporter.suffix}"',
         "x-brdf-difference": repr(made.difference),

@@ -59,7 +59,7 @@ async def cancel(request: Request, fit_id: str) -> FitView:
 @router.delete("/{fit_id}", status_code=204, responses=responses(404, 406, 422, *WRITES))
 async def remove(request: Request, fit_id: str) -> None:
     """Remove a fit and its inline samples for good, cancelling it first where it is not finished."""
-    await _jobs.removed(state(request), "fit", fit_id)
+    await _jobs.remove(state(request), "fit", fit_id)
 
 
 def _accepted(request: Request, body: bytes) -> Job:

@@ -11,11 +11,11 @@ import brdfcore as bc
 from brdfcore import plots
 from brdfcore.errors import unknown_name
 
-from ..errors import ProblemError, responses
+from ..errors import responses
 from ..schemas import FitOutcome, FitRequest
 from ..state import State, state
 from ._http import require_accepted, unchanged
-from ._jobs import Ranked, absent, found, outcome_of
+from ._jobs import Ranked, absent, found, outcome_of, result_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -91,10 +91,7 @@ async def _plot(request: Request, fit_id: str, asked: Asked, kind: Kind) -> Resp
     require_accepted(request, _MEDIA_TYPE[kind])
     service = state(request)
     job = found(service, "fit", fit_id)
-    if job.result is None:
-        raise ProblemError(
-            409, f"Expected the fit to have succeeded, but it is {job.status}. A plot needs a fit that has succeeded."
-        )
+    result = result_of(job)
     shown = f"{bc.__version__} {job.id} {job.finished} {kind} {type(asked).__name__} {asked.model_dump_json()}"
     tag = f'W/"{hashlib.sha256(shown.encode()).hexdigest()[:32]}"'
     headers = {"etag": tag, "cache-control": "private, no-cache"}
@@ -104,7 +101,7 @@ async def _plot(request: Request, fit_id: str, asked: Asked, kind: Kind) -> Resp
     if body is None:
         raise absent("fit", fit_id)  # removed just now
     loop = asyncio.get_running_loop()
-    image = await loop.run_in_executor(service.aside, _drawn, service, body, job.result, asked, kind)
+    image = await loop.run_in_executor(service.aside, _drawn, service, body, result, asked, kind)
     return Response(image, headers=headers, media_type=_MEDIA_TYPE[kind])
 
 

@@ -7,12 +7,12 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from .. import renders
-from ..errors import WRITES, ProblemError, inlined, responses
+from ..errors import WRITES, inlined, responses
 from ..jobs.records import Job
-from ..schemas import RenderOutcome, RenderPage, RenderRequest, RenderSummary, RenderView
-from ..state import State, state
+from ..schemas import RenderPage, RenderRequest, RenderSummary, RenderView
+from ..state import state
 from . import _jobs
-from ._http import accepted_of, json_accepted, json_content, parsed, unchanged
+from ._http import accepted_of, json_accepted, json_content, parsed
 
 router = APIRouter(prefix="/v1/renders", tags=["renders"])
 
@@ -88,10 +88,7 @@ async def cancel(request: Request, render_id: str) -> RenderView:
 @router.delete("/{render_id}", dependencies=_JSON, status_code=204, responses=responses(404, 406, 422, *WRITES))
 async def remove(request: Request, render_id: str) -> None:
     """Remove a render and its image for good, cancelling it first where it is not finished."""
-    service = state(request)
-    job = await _jobs.removed(service, "render", render_id)
-    if job.result is not None:
-        await asyncio.to_thread(_forget, service, json.loads(job.result)["hash"])
+    await _jobs.remove(state(request), "render", render_id, renders.remove)
 
 
 def _submitted(request: Request, body: bytes) -> Job:
@@ -101,23 +98,4 @@ def _submitted(request: Request, body: bytes) -> Job:
 
 async def _image(request: Request, render_id: str, kind: renders.Kind) -> Response:
     media_type = accepted_of(request, _MEDIA_TYPES[kind])
-    service = state(request)
-    job = _jobs.found(service, "render", render_id)
-    if job.result is None:
-        raise ProblemError(
-            409, f"Expected the render to have succeeded, but it is {job.status}. Its image comes when it has."
-        )
-    name = RenderOutcome.model_validate_json(job.result).hash
-    headers = {"etag": f'"{name[:32]}-{kind}"', "cache-control": "private, no-cache"}
-    if unchanged(request, headers["etag"]):
-        return Response(status_code=304, headers=headers)
-    content = await asyncio.to_thread(renders.content, service.settings.data, name, kind)
-    if content is None:  # removed just now with another job that had made the same image
-        raise ProblemError(404, f"Expected the image of the render {render_id!r} to be kept. Post its request again.")
-    return Response(content, headers=headers, media_type=media_type)
-
-
-def _forget(service: State, name: str) -> None:
-    """Remove an image, unless another job made the same."""
-    if not service.store.mentioned("render", name):
-        renders.remove(service.settings.data, name)
+    return await _jobs.kept_file(request, "render", render_id, renders.content, kind, media_type)

@@ -103,7 +103,7 @@ def test_a_batch_of_a_hundred_materials(show, case: str) -> None:
             "loop of trf, analytic": lambda: loop(peers, analytic=True),
             "loop of trf, tuned": lambda: loop(tuned, analytic=False),
         },
-        rounds=3,
+        rounds=9 if lobe == "ward" else 3,
     )
     ratios = {name: times[name] / times["ours"] for name in times if name != "ours"}
     show(f"100 materials of {case}: ours {times['ours']:.2f} s; {report(ratios)} (floor 10 against trf, aim 30)")
@@ -151,9 +151,9 @@ from test_fitting_speed import MERL, TWO, measured
 samples = measured(TWO, MERL)
 bc.fit(samples.subset(torch.arange(100)), "lambert")
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-begun = time.perf_counter()
+begun = time.process_time()
 fit = bc.fit(samples, "lambert + kurt(isotropic) + kurt(isotropic)")
-print(time.perf_counter() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, before / 1e6,
+print(time.process_time() - begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, before / 1e6,
       fit.objective, fit.cost.starts)
 """
 

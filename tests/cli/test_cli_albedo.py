@@ -114,6 +114,8 @@ MISTAKES = {
     "axis in radians": (("lambert", "--table", "t.npz", "--axis", "theta=0:1"), "named theta_deg"),
     "angles of an axis": (("lambert", "--table", "t.npz", "--axis", "theta_deg=0:91"), "within [0, 90], got (0, 91)"),
     "unknown axis": (("lambert", "--table", "t.npz", "--axis", "kurt.m"), "an axis to be a known name"),
+    "angles of a table": (("lambert", "--table", "t.npz", "--theta-deg", "0,60"), "--theta-deg to go without --table"),
+    "azimuth of a table": (("lambert", "--table", "t.npz", "--phi-deg", "0"), "--phi-deg to go without --table"),
     "table suffix": (("lambert", "--table", "t.csv"), ".npz or .json"),
     "table folder": (("lambert", "--table", "nosuch/t.npz"), "the table's folder to exist"),
     "plot suffix": (("lambert", "--plot", "x.pdf"), ".svg or .png"),

@@ -10,7 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import brdfcore as bc
+from brdfcore.energy import peak
 from brdfcore.energy.albedo import of_form
+from brdfcore.energy.scan import Scan, lone_terms
 from brdfcore.geometry import from_angles
 from brdfcore.models.form import Form, Term
 
@@ -205,6 +207,41 @@ def test_the_maximum_is_a_dense_scans(text):
     assert float(there[found.channel]) == pytest.approx(found.max_albedo, abs=1e-6)
 
 
+LEVEL = [  # ks, and a lump whose albedo is ks as far as the disk holds it, whose edge each azimuth meets elsewhere
+    (0.818480843661, "rx=0.0574631633064, ry=0.0234770099383, n=1.12094139283"),
+    (0.95, "rx=0.14, ry=0.043, n=1.9"),
+]
+
+
+@pytest.mark.parametrize(("ks", "lump"), LEVEL)
+def test_the_edge_of_a_level_albedo_leaves_no_doubt(ks, lump):
+    """No polynomial fits there."""
+    found = certified(f"edwards(ks={ks}, {lump})", tolerance=1e-5)
+    assert found.error <= 1e-5
+    assert found.max_albedo == pytest.approx(ks, abs=1e-5)
+
+
+def test_what_is_too_dear_to_be_looked_at_counts_as_error(monkeypatch):
+    monkeypatch.setattr(peak, "DEAREST", 0)
+    assert 1e-3 < certified(f"edwards({LEVEL[1][1]})", tolerance=1e-5).error < 1
+
+
+def test_a_direction_is_integrated_once():
+    """At the normal every azimuth is the same."""
+    material = bc.material("ggx(ax=0.1, ay=0.3)")
+    scan = Scan(lone_terms(material.form, {key: value.detach() for key, value in material.values().items()}), 1)
+    one = scan.albedos(torch.zeros(1).double(), scan.s[:1], 1e-3)[0]
+    cost = scan.evaluations
+    every = scan.albedos(torch.zeros_like(scan.s), scan.s, 1e-3)[0]
+    assert scan.evaluations == 2 * cost
+    assert every.tolist() == one.expand_as(every).tolist()
+
+
+def test_of_the_last_row_only_what_may_be_its_largest_is_settled():
+    """A regression number: 2.7e6 if all of it is, for a lobe that is largest towards grazing along its narrow axis."""
+    assert certified("ggx(ax=0.1, ay=0.3)").evaluations < 2.5e6
+
+
 @pytest.mark.parametrize("text", MAXIMA[:3])
 def test_the_maximum_is_what_samples_weigh(text):
     """Monte Carlo shares no rule with the quadrature."""
@@ -247,12 +284,18 @@ def test_no_dense_scan_contradicts_a_certificate_in_many_cases(choice, number):
     contradict(choice, number, 60, 13)
 
 
+@pytest.mark.full
+def test_a_lopsided_limit_may_take_most_of_what_may_be_spent():
+    found = bc.certify(bc.material("ggx(separable, schlick, anisotropic, ks=0.897, f0=0.136, ax=0.061, ay=1.204)"))
+    assert found.error <= 1e-5
+
+
 def contradict(choice: bc.Model, number: int, angles: int, azimuths: int) -> None:
     """Hold a certificate against a scan that may be denser."""
     material = drawn(choice, number)
     found = bc.certify(material, tolerance=1e-5)
     largest = float(dense(material, angles, 1 if found.isotropic else azimuths, 1e-4).max())
-    assert found.error <= 1e-5, str(material)
+    assert found.error <= 1e-5 * max(1.0, found.max_albedo), str(material)  # lafortune's may be 1e123
     assert found.max_albedo >= largest * (1 - 1e-4) - 1e-4, str(material)
     assert largest <= 1 + 2e-4 or not found.energy_conserving, str(material)
     assert found.reciprocal or not choice.reciprocal, str(material)

@@ -325,13 +325,33 @@ def test_a_tolerance_that_is_none_is_refused(tolerance: float) -> None:
         bc.albedo_table("lambert", tolerance=tolerance, cache=None)
 
 
-@pytest.mark.parametrize(
-    ("text", "axes"), [("ward(isotropic)", {}), ("kurt(isotropic, m=0.3, alpha=0)", {"kurt.alpha": (0.0, 0.2)})]
-)
-def test_what_diverges_needs_a_largest_angle(text: str, axes: dict[str, tuple[float, float]]) -> None:
+DIVERGENT: list[tuple[str, dict[str, tuple[float, float] | None]]] = [
+    ("ward(isotropic)", {}),
+    ("lambert(kd=[0.2, 0.5]) + ward_duer(ax=0.1, ay=0.3, rs=[0.1, 0])", {"lambert.kd": None}),
+    ("kurt(isotropic, m=0.3, alpha=0)", {"kurt.alpha": (0.0, 0.2)}),
+]
+
+
+@pytest.mark.parametrize(("text", "axes"), DIVERGENT)
+def test_what_diverges_needs_a_largest_angle(text: str, axes: dict[str, tuple[float, float] | None]) -> None:
+    """Told before a table is begun, so that none is accepted that would fail."""
     with pytest.raises(InvalidValueError, match="Expected the axis theta to end before the horizon for") as refused:
-        bc.albedo_table(text, axes, 1e-2, cache=None)
+        tables.check(bc.material(text), axes, 1e-2)
     assert refused.value.field == "axes"
+    assert "such as 1.5 (86 for theta_deg)" in str(refused.value)
+    assert tables.check(bc.material(text), axes | {"theta": (0.0, 1.5)}, 1e-2)[0].high == 1.5
+
+
+def test_what_grows_by_less_than_the_tolerance_needs_none() -> None:
+    """Up to the lowest height of a table; so does a term of which there is nothing."""
+    assert tables.check(bc.material("lambert(kd=0.5) + ward(rs=1e-12, a=0.1) + ward_duer(rs=0)"), {}, 1e-3)
+
+
+def test_growth_that_no_value_foretells_is_found_when_the_table_is_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_tabulate, "growth", lambda form, values: None)
+    assert tables.check(bc.material("ward"), {}, 1e-2)
+    with pytest.raises(InvalidValueError, match="Expected the axis theta to end before the horizon for ward"):
+        bc.albedo_table("ward", {}, 1e-2, cache=None)
 
 
 def test_an_albedo_that_no_number_holds_is_refused() -> None:

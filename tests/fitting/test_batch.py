@@ -1,5 +1,7 @@
 """`bc.fit_batch` gives what `bc.fit` gives each of the materials alone."""
 
+import time
+
 import pytest
 import torch
 from fit_cases import TRUE, measured_from
@@ -96,7 +98,9 @@ def test_what_differs_beside_values_and_directions_stays_with_its_material() -> 
 def test_a_batch_costs_each_fit_its_share() -> None:
     several = [measured_from(TRUE, noise=0.02 * (i + 1)) for i in range(6)]
     seen: list[Progress] = []
+    begun = time.perf_counter()
     fits = fit_batch(several, MODEL, progress=seen.append)
+    assert 0 < 6 * fits[0].cost.seconds == 6 * fits[5].cost.seconds <= time.perf_counter() - begun
     assert fits[0].cost.evaluations < 3 * bc.fit(several[0], MODEL).cost.evaluations
     assert [p.fraction for p in seen] == sorted(p.fraction for p in seen)
     assert seen[-1].fraction == pytest.approx(1)

@@ -122,6 +122,8 @@ def test_several_models_are_compared(client: Client) -> None:
     ranking = fit.comparison.ranking
     assert ranking[0].fit.model == fit.result.model
     assert {ranked.status for ranked in ranking} == {"converged", "undetermined"}
+    assert ranking[1].fit.model.encode() in fit.export("json", rank=2).content
+    assert fit.plot("albedo", "png", rank=2) != fit.plot("albedo", "png")
     (one,) = client.fits([measured_diffuser()], models=["lambert"])
     assert one.parameters["lambert.kd"] == pytest.approx(KD, rel=0.01)
     with pytest.raises(ProblemError, match="Expected either model or models to be given"):
@@ -306,6 +308,9 @@ def test_a_service_that_does_not_answer_is_named() -> None:
 
 def test_an_answer_of_another_service_is_told_apart() -> None:
     client = scripted(lambda request: httpx2.Response(502, text="<html>"))
+    foreign = scripted(lambda request: httpx2.Response(200, text="<p>It works!</p>"))
+    with foreign, pytest.raises(UnreachableError, match=r"Expected an answer of this service at http.*/v1/models, got"):
+        foreign.models()
     with client, pytest.raises(ProblemError, match=r"got status 502. Check the URL.") as refused:
         client.models()
     assert refused.value.status == 502

@@ -118,6 +118,9 @@ def test_the_numbers_come_as_json_and_as_npz(
     file.write_bytes(as_npz.content)
     assert float(bc.AlbedoTable.load(file)(0.3, **{"oren_nayar.sigma": 0.5, "lambert.kd": 0.1})) > 0
     assert http.get(path, headers={"accept": "text/csv"}).status_code == 406
+    tag = http.get(path, headers={"accept": "application/x-npz"}).headers["etag"]
+    assert http.get(path, headers={"accept": "application/x-npz", "if-none-match": tag}).status_code == 304
+    assert http.get(path, headers={"if-none-match": tag}).status_code == 200, "as JSON it is another file"
 
 
 def test_the_same_table_is_not_made_twice(http: TestClient, settings: Settings) -> None:
@@ -142,10 +145,17 @@ def test_numbers_that_are_gone_are_a_problem(http: TestClient, settings: Setting
 
 
 def test_a_table_that_cannot_be_made_says_why(http: TestClient) -> None:
-    body = {"material": "ward(isotropic, rs=1)", "axes": {}, "tolerance": 0.01}
+    material = "lafortune(ks=1, cx=-2, cy=-2, n=1000000)"  # no number holds its albedo
+    body = {"material": material, "axes": {"theta_deg": [0, 86]}, "tolerance": 0.01}
     failed = http.post("/v1/albedo", json=body, headers={"prefer": "wait=20"}).json()
     assert (failed["status"], failed["result"]) == ("failed", None)
-    assert failed["error"].startswith("Expected the axis theta to end before the horizon")
+    assert failed["error"].startswith("Expected the albedo to be a finite number all over the table")
+
+
+def test_a_table_without_a_limit_is_not_accepted(idle: TestClient) -> None:
+    problem = idle.post("/v1/albedo", json={"material": "ward(isotropic, rs=1)", "axes": {}}).json()
+    assert problem["status"] == 422
+    assert problem["detail"].startswith("Expected the axis theta to end before the horizon for ward(isotropic)")
 
 
 def test_fits_and_tables_are_apart(idle: TestClient, request_body: dict[str, Any]) -> None:

@@ -51,7 +51,7 @@ def test_what_has_not_succeeded_has_no_export(idle: TestClient, request_body: di
     queued = idle.post("/v1/fits", json=request_body).json()
     answer = idle.get(f"/v1/fits/{queued['id']}/export/json")
     assert answer.status_code == 409
-    assert "it is queued. An export needs a fit that has succeeded" in answer.json()["detail"]
+    assert "it is queued. Only then is there something to send" in answer.json()["detail"]
 
 
 def test_of_compared_models_any_is_exported_and_drawn(http: TestClient, request_body: dict[str, Any]) -> None:

@@ -20,6 +20,7 @@ def test_arguments_win_over_the_environment_and_none_is_no_argument() -> None:
     settings = Settings.from_environment(environment, port=9001, host=None)
     assert (settings.port, settings.host) == (9001, "127.0.0.1")
     assert (settings.data, settings.fit_seconds, settings.workers) == (pathlib.Path("/data"), 1.5, 3)
+    assert Settings.from_environment({"BRDF_DATA": "", "BRDF_PORT": ""}) == Settings.from_environment({})
 
 
 @pytest.mark.parametrize(

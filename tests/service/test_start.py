@@ -34,6 +34,9 @@ def test_what_cannot_be_started_is_told_before_it_starts(
         db.execute("PRAGMA user_version = 1")
     with pytest.raises(InvalidValueError, match=r"Expected jobs\.sqlite3 to be of this version"):
         server(Settings(data=tmp_path / "new"))
+    (tmp_path / "jobs.sqlite3").write_text("the jobs of another program, long enough to have a header" * 20)
+    with pytest.raises(InvalidValueError, match=r"Expected .* to be a job store that can be written, got: file is not"):
+        server(Settings(data=tmp_path))
 
 
 def test_every_line_of_the_log_is_json(
