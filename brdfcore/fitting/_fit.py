@@ -13,6 +13,7 @@ from .asked import fell_away
 from .conservation import conserving
 from .effects import AUTO
 from .given import plainly
+from .magnitude import check_magnitudes
 from .plan import Plan, check
 from .result import Fit
 from .search import search
@@ -121,7 +122,10 @@ def planned(several: Sequence[Samples], model: str, **keywords: Any) -> tuple[Pl
         check_samples(samples)
     first = several[0]
     plan = check(first.values.shape[1], model, azimuth_observed=first.azimuth_observed, **keywords)
-    return plan, [_not_too_steep(samples, plan.max_theta) for samples in several]
+    kept = [_not_too_steep(samples, plan.max_theta) for samples in several]
+    for samples in kept:
+        check_magnitudes(samples, keywords.get("loss", "cosine"), plan.robust_scale)
+    return plan, kept
 
 
 def check_samples(samples: object) -> None:

@@ -17,7 +17,8 @@ from .given import check_known, whole
 from .limits import check_max_theta, check_robust, checked_bounds
 from .losses import LOSSES
 
-OPTIMIZERS = ("auto", "least_squares", "lbfgs", "adam")
+GRADIENT = ("lbfgs", "adam")  # which follow the gradient alone
+OPTIMIZERS = ("auto", "least_squares", *GRADIENT)
 
 
 @dataclass(frozen=True)
