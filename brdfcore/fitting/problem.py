@@ -195,6 +195,30 @@ class Problem:
             matrix[at] += rows @ rows.mT
         return Gram(loss, self.scatter_vector(gradient), self.scatter_matrix(matrix))
 
+    def gradient(self, x: Tensor, which: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """The loss (S,) of each row and the gradient (S, D) of half of it, as in its normal equations.
+
+        Of one channel no product of matrices is asked for: threads that LAPACK calls in cost more than few samples do.
+        """
+        self.evaluations += len(x)
+        mix, natural, starts = self.mix(x), self.natural(x), len(x)
+        loss = torch.zeros(starts, dtype=torch.float64)
+        right = torch.zeros_like(mix.value)  # (S, C, Q)
+        for at, _, piece in self.data.blocks(starts):
+            own = None if which is None else which[at]
+            data = piece if own is None else piece.rows(own)
+            columns = self.columns.all(rows_of(natural, at), data.g, at.stop - at.start, self.channels)
+            value = mix.value[at]
+            if self.channels == 1:
+                f = (value.unsqueeze(-1) * columns).sum(2)
+                rho, r, slope = self.residuals(f, data, own)
+                right[at] += (columns * (slope * r).unsqueeze(2)).sum(-1)
+            else:
+                rho, r, slope = self.residuals(_mixed(value, columns), data, own)
+                right[at] += (columns @ (slope * r).unsqueeze(-1)).squeeze(-1)
+            loss[at] += rho.sum((1, 2))
+        return loss, self.scatter_vector((mix.slopes * right.unsqueeze(-1)).sum(-2))
+
     def scatter_vector(self, by_channel: Tensor) -> Tensor:
         """(S, C, P) by channel and name, summed into (S, D)."""
         flat = self.index.reshape(-1)

@@ -145,13 +145,13 @@ def test_what_is_of_no_size_is_named_before_any_work(case: str) -> None:
 @pytest.mark.parametrize("model", ["lambert", "lambert + ward_bounded", "lambert + kurt"])
 def test_values_beyond_any_reflectance_are_told(model: str) -> None:
     """In percent, or in counts; and not where a lobe alone is missing, or values are fixed."""
-    good = measured_from(TRUE, noise=0.01)
+    good = measured_from(TRUE, count=80, noise=0.01)
 
     def told(factor: float, **keywords: object) -> bool:
         samples = bc.Samples(good.wi, good.wo, factor * good.values)
         return any("Check the unit and the quantity" in one for one in bc.fit(samples, model, **keywords).warnings)
 
-    assert [told(factor) for factor in (1, math.pi, 100, 1e4, 1e8)] == [False, False, True, True, True]
+    assert [told(factor) for factor in (math.pi, 100, 1e8)] == [False, True, True]
     form = bc.fit(good, model).form
     assert not told(100, fixed=dict.fromkeys(form.parameters, 0.5))
 
