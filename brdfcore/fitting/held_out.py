@@ -7,6 +7,7 @@ steps beside the fit itself, and finds the optimum next to that of all the data.
 fit of its own.
 """
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -56,6 +57,17 @@ class HeldOut:
     def to_dict(self) -> dict[str, Any]:
         """The errors as JSON-able data."""
         return {**vars(self), "folds": list(self.folds), "incidences": [vars(one).copy() for one in self.incidences]}
+
+    def __str__(self) -> str:
+        """The errors as plain text, a line for each incidence that was left out, the steepest last."""
+        lines = [
+            f"held out: error {self.error:.5g}, and {self.fitted:.5g} where fitted: root mean squares of the "
+            f"{self.loss} loss's residual, {len(self.folds)} folds in {self.seconds:.2f} s",
+            f"{'incidence [deg]':<20}{'fold':>8}{'samples':>10}{'error':>12}",
+        ]
+        blocks = sorted(self.incidences, key=lambda one: (one.theta, one.fold))
+        lines += [f"{math.degrees(b.theta):<20.4g}{b.fold:>8}{b.samples:>10}{b.error:>12.5g}" for b in blocks]
+        return "\n".join(lines)
 
 
 def held_out(

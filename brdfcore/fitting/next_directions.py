@@ -75,6 +75,16 @@ class NextDirections:
             "information": self.information,
         }
 
+    def __str__(self) -> str:
+        """The directions and the shrinkage as plain text, angles in degrees, a line each."""
+        rows = torch.rad2deg(torch.stack(list(self.angles.values()), -1)).tolist()
+        lines = [f"{'measure next [deg]':<20}" + "".join(f"{name:>10}" for name in self.angles)]
+        lines += [f"{number:<20}" + "".join(f"{angle:>10.4g}" for angle in row) for number, row in enumerate(rows, 1)]
+        lines.append("intervals then, as shares of those now:")
+        for key, value in self.shrinkage.items():
+            lines.append(f"{key:<32}" + ", ".join(f"{share:.3g}" for share in value.reshape(-1).tolist()))
+        return "\n".join(lines)
+
 
 def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -> NextDirections:
     """So many directions, no two alike, whose samples would make the fit's values surest.
@@ -87,9 +97,7 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
         raise ParameterError(
             f"Expected fit to be a Fit, got {type(fit).__name__}. Pass what bc.fit returned.", field="fit"
         )
-    wanted, max_theta = whole(count), plain(max_theta)
-    if wanted is None or wanted < 1:
-        raise ParameterError(f"Expected count to be a whole number from 1 on, got {count!r}. Use 10.", field="count")
+    wanted, max_theta = check_count(count), plain(max_theta)
     check_angle(max_theta)
     plan = Plan(fit.form, fit.values, frozenset(fit.fixed), frozenset(fit.gray), frozenset(fit.per_channel), ())
     problem = Problem(plan, fit.samples, LOSSES[fit.loss])
@@ -111,6 +119,14 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
     shrinkage = {key: ratio[at].reshape(plan.start[key].shape) for key, at in problem.slices.items()}
     information = float(torch.logdet(before) - torch.logdet(after))
     return NextDirections(wi[chosen], wo[chosen], shrinkage, information)
+
+
+def check_count(count: object) -> int:
+    """The number of directions; raises ParameterError where this is none."""
+    wanted = whole(count)
+    if wanted is None or wanted < 1:
+        raise ParameterError(f"Expected count to be a whole number from 1 on, got {count!r}. Use 10.", field="count")
+    return wanted
 
 
 def reachable(samples: Samples, max_theta: float) -> tuple[Tensor, Tensor]:
