@@ -17,7 +17,7 @@ Source: Fedorov 1972, exchange of design points; White 1980 for A^-1 B A^-1.
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -31,9 +31,9 @@ from .data import Data
 from .given import plain, whole
 from .limits import check_angle
 from .losses import LOSSES
-from .plan import Plan
 from .problem import Problem
 from .result import Fit
+from .robust import ROBUST
 from .signal_noise import noise
 
 _STEP = 5.0  # degrees between polar angles
@@ -99,8 +99,9 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
         )
     wanted, max_theta = check_count(count), plain(max_theta)
     check_angle(max_theta)
-    plan = Plan(fit.form, fit.values, frozenset(fit.fixed), frozenset(fit.gray), frozenset(fit.per_channel), ())
-    problem = Problem(plan, fit.samples, LOSSES[fit.loss])
+    plan = replace(fit.plan, start=fit.values, starts=())
+    scale = None if fit.robust_scale is None else torch.tensor([fit.robust_scale], dtype=torch.float64)
+    problem = Problem(plan, fit.samples, LOSSES[fit.loss], robust_scale=scale)
     x = problem.pack(fit.values).unsqueeze(0)
     if not problem.size:
         raise ParameterError(
@@ -168,7 +169,7 @@ class _Design:
             for piece in data.chunks(problem.channels):  # as the leverages stand
                 own = f[..., at : at + len(piece.c)]
                 counted = (piece.root_weight > 0).expand_as(own)
-                squares.append((own - piece.y)[counted].square())
+                squares.append(_counted(problem, own, piece)[counted].square())
                 values.append(own[counted])
                 at += len(piece.c)
             self.noise = noise(torch.cat(squares) / left, torch.cat(values))
@@ -224,6 +225,16 @@ class _Design:
             more_a, more_b = self.with_(some, v)
             found.append(2 * torch.linalg.slogdet(a + more_a)[1] - torch.linalg.slogdet(b + more_b)[1])
         return torch.cat(found)
+
+
+def _counted(problem: Problem, f: Tensor, data: Data) -> Tensor:
+    """What is left of the values beside f (1, C, N), as much as a robust form counts of it."""
+    left = f - data.y
+    if problem.plan.robust is None or problem.robust_scale is None:
+        return left
+    plain = Problem(replace(problem.plan, robust=None), [], problem.loss_kind, data=data)
+    z = (plain.residuals(f, data, None)[1] / problem.robust_scale).square()
+    return left * ROBUST[problem.plan.robust].functions(z)[1]
 
 
 def _exchanged(design: _Design, columns: Tensor, variance: Tensor, count: int) -> list[int]:

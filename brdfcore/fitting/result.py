@@ -91,6 +91,7 @@ class Fit:
     channels: tuple[str, ...]
     provenance: dict[str, str | int]
     conservation: Conservation | None = None  # where `conserve_energy` was asked for
+    robust_scale: float | None = None  # of the residuals, from where a robust form counts less of them
     ladder: tuple[Rung, ...] = ()  # the materials that were tried, where the fit chose among several
 
     @cached_property

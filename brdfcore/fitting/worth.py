@@ -90,6 +90,7 @@ def fits(
                 per_channel=tuple(sorted(plan.per_channel)),
                 chi_square=None if chi_square is None else (chi_square[row], freedom[row]),
                 cost=spent,
+                robust_scale=None if problem.robust_scale is None else float(problem.robust_scale[row]),
                 channels=samples.channels,
                 provenance={"version": __version__, "torch": torch.__version__, "seed": seed, "input": whole.hash},
             )
