@@ -41,7 +41,7 @@ BODIES: dict[tuple[str, str], dict[str, Any]] = {
     ("post", "/v1/datasets"): {"csv": _CSV},
     ("post", "/v1/evaluate"): {"a text": {"material": "lambert(kd=0.2) + ward_bounded(rs=0.05, a=0.1)", **_ANGLES}},
     ("post", "/v1/albedo"): {
-        "values": {"material": "kurt_eq_13", "theta_deg": [0, 60, 89], "tolerance": 1e-6},
+        "values": {"material": "kurt_eq_13", "theta_deg": [0, 60, 89], "tolerance": 1e-6, "certificate": True},
         "a table": {"material": "ward_bounded(isotropic)", "axes": {"ward_bounded.a": [0.1, 0.3]}, "tolerance": 1e-3},
     },
     ("post", "/v1/sphere"): {"a text": {"material": "lambert(kd=[0.2, 0.05, 0.05]) + ward_bounded(rs=0.05, a=0.1)"}},

@@ -92,7 +92,7 @@ class Certificate:
             "energy_conserving": self.energy_conserving,
             "decided": self.decided,
             "max_albedo": _finite(self.max_albedo),
-            "error": self.error,
+            "error": _finite(self.error),
             "at_theta_deg": math.degrees(self.at_theta),
             "at_phi_deg": math.degrees(self.at_phi),
             "channel": self.channel,

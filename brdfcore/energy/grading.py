@@ -31,7 +31,9 @@ FINEST, WIDEST = 1e-3, 1.0  # widths of kernels
 POINTS, STEPS = 129, 3  # about each place, between which a map is inverted, and steps of Newton's method from there
 LOPSIDED = 0.3  # a ratio of widths below which a Smith lobe's masking has features at the horizon
 SLIGHT = 1e5  # times the error that may be neglected: what a tail is worth whose features need not be met
-PRECISE = 2e-13  # an error that may be neglected from which on fewer rays pay for a map: at 2e-9 of tolerance
+# an error that may be neglected from which on fewer rays pay for a map, where masking is correlated and where not: at
+# 2e-9 and 1e-5 of tolerance
+PRECISE, PRECISE_SEPARABLE = 2e-13, 1e-9
 
 
 class Rays(NamedTuple):
@@ -102,10 +104,19 @@ def _sinh_ratio(x: Tensor) -> Tensor:
 class Circle:
     """The circle of rays for each row, for a lobe of the given widths (R, 1) or (1, 1); `two`, if they differ.
 
-    Kinks count where they matter more than `error` of the whole.
+    Kinks count where they matter more than `error` of the whole; `separable`: so is the lobe's masking of wi and wo.
     """
 
-    def __init__(self, profile: Profile, rows: Rows, widths: tuple[Tensor, Tensor], two: bool, error: float) -> None:
+    def __init__(
+        self,
+        profile: Profile,
+        rows: Rows,
+        widths: tuple[Tensor, Tensor],
+        two: bool,
+        error: float,
+        *,
+        separable: bool = False,
+    ) -> None:
         self.profile, self.two = profile, two
         co, toward = rows.co[:, None], rows.azimuth[:, None]
         self.tangent = torch.sqrt((1 - co) * (1 + co)) / co
@@ -127,7 +138,10 @@ class Circle:
             kept = layer.square() > NEGLIGIBLE_LAYER * error * self.tau
             finest = torch.where(kept, torch.minimum(kappa, layer), kappa)
             self.fine = torch.asinh(self.tau * stretch / finest).clamp(min=IDENTITY)
-        self.dense = self._dense(rows, error) if two and profile.smith and profile.fall == "algebraic" else None
+        pays = error <= (PRECISE_SEPARABLE if separable else PRECISE)
+        self.dense = (
+            self._dense(rows, error) if pays and two and profile.smith and profile.fall == "algebraic" else None
+        )
 
     def _dense(self, rows: Rows, error: float) -> Dense | None:
         """The map that is dense where wi, at the horizon, lies along the narrow axis; None where no row needs it.
@@ -137,7 +151,7 @@ class Circle:
         """
         narrow, wide = torch.minimum(self.wx, self.wy), torch.maximum(self.wx, self.wy)
         needed = (narrow < LOPSIDED * wide) & (narrow.pow(3) / wide > SLIGHT * error)
-        if error > PRECISE or not bool(needed.any()):
+        if not bool(needed.any()):
             return None
         everyone = torch.arange(len(needed), device=needed.device)
         sine = torch.sqrt((1 - rows.co) * (1 + rows.co))[:, None]
@@ -149,7 +163,8 @@ class Circle:
             *at, slope = self.at(everyone, w, self.steepness)
             turn = slope * self.wx * self.wy / ((self.wx * at[0]).square() + (self.wy * at[1]).square())
             along = side * torch.where(self.swapped, yo, xo)
-            by_wi = (1 + along) / (1 + 2 * along + sine.square()).clamp(min=FINEST)  # d phi of h by that of wi
+            both = 1 + 2 * along + sine.square()  # of the sum of wi and wo, squared; 0 where they are opposite
+            by_wi = torch.where(both > 0, (1 + along) / both, math.inf)  # d phi of h by that of wi
             finest = (by_wi * narrow / wide / turn).clamp(FINEST, WIDEST)
             for k in range(SCALES):
                 place.append(w)
@@ -164,6 +179,7 @@ class Circle:
             return torch.acos(level.clamp(-1, 1)) * torch.where(sine < 0, -1.0, 1.0)
 
         norm = torch.hypot(x, y)
+        x, norm = torch.where(norm > 0, x, 1.0), torch.where(norm > 0, norm, 1.0)  # any ray: that map is even there
         cosine, sine = torch.where(self.swapped, x, y) / norm, torch.where(self.swapped, y, -x) / norm
         inner = ungraded(cosine, sine, self.first) - self.start
         return ungraded(torch.cos(inner), torch.sin(inner), self.steepness)

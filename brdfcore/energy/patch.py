@@ -18,7 +18,7 @@ DENSE = 65  # points along each coordinate at which the polynomial is looked at
 ALONE, BOTH = 11, 7  # nodes of a coordinate, where the other one is held and where it is not
 SHRINK, ROUNDS = 4.0, 5
 SAFETY = 4.0  # of what a polynomial's last coefficients say that it lacks
-DEAREST = 4 * 10**7  # evaluations of a scan after which its peaks stay as they are, and what is in doubt counts as error
+DEAREST = 10**7  # evaluations of a scan after which its peaks stay as they are, and what is in doubt counts as error
 
 
 class Peak(NamedTuple):

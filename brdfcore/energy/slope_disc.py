@@ -23,6 +23,7 @@ from torch import Tensor
 
 from ..geometry import FLOOR, Geometry
 from ..models import Model
+from ..models._smith import SmithLobe
 from ..parameters import Values
 from .grading import Circle, Rays
 from .lobes import PROFILES, anisotropic, slope_widths
@@ -72,7 +73,9 @@ class SlopeDisc(Integral):
         self.last = LADDER.index(2048), LADDER.index(1024)
         self.pieces = {"none": 1, "equal": 2, "grooves": 3}[self.profile.kink]  # into which kinks part a ray
         with torch.no_grad():
-            self.circle = Circle(self.profile, rows, slope_widths(model, self.place), self.two, error)
+            separable = isinstance(model, SmithLobe) and not model.correlated
+            widths = slope_widths(model, self.place)
+            self.circle = Circle(self.profile, rows, widths, self.two, error, separable=separable)
 
     def guess(self, digits: float) -> tuple[Tensor, float]:
         """About the sizes that leave an error of 10^-digits."""

@@ -7,6 +7,14 @@ richer of the two materials (signal_noise.py) and serve both. Where the noise is
 and this is Schwarz's criterion (1978) with the noise estimated. Where it is not, as under relative noise, when a few
 samples near the mirror direction carry all of it, p counts what the noise of the samples that decide a value can
 feign (Takeuchi 1976), as if there were more values, or fewer samples.
+
+A v_i is the likeliest noise as a function of the signal, but at most three times the mean of e_i^2 = r_i^2 / (1 - h_i)
+over the m residuals next in signal, those of 20 directions. So misfit in one place is never taken for noise in another,
+and whatever the residuals are, noise or misfit, the criterion falls where the squares fall by more than
+
+    3 p' ln n / m sum e_i^2,    p' = sum max(0, h_i - h_i of the leaner)
+
+about 1 / channels of what is left for every value that is added.
 """
 
 import math
@@ -16,8 +24,9 @@ import torch
 from torch import Tensor
 
 from .problem import Problem
-from .signal_noise import noise
+from .signal_noise import variances
 
+NEAR = 20  # directions whose residuals, next in signal, say what the noise of one is at most
 _RANK = 1e-11  # eigenvalues of the scaled J^T J below this fraction are rounding, as in uncertainty.py
 _LEAST = 1e-3  # of 1 - h: a sample that decides a value alone tells little of its own noise
 _NO_MATTER = 1e-12  # of the data's squares: residuals of the sixth digit call for no effect, whatever their shape
@@ -34,6 +43,7 @@ class Spread(NamedTuple):
     signal: Tensor
     unit: float
     values: int
+    channels: int
 
 
 def spread(problem: Problem, x: Tensor) -> Spread:
@@ -51,7 +61,7 @@ def spread(problem: Problem, x: Tensor) -> Spread:
         leverage.append((columns * (own @ columns)).sum(2)[counted])
         signal.append((slope * problem.f(x, piece))[counted])
     unit = float(problem.squares[0]) / max(1, sum(map(len, squares)))
-    return Spread(torch.cat(squares), torch.cat(leverage), torch.cat(signal), unit, problem.size)
+    return Spread(torch.cat(squares), torch.cat(leverage), torch.cat(signal), unit, problem.size, problem.channels)
 
 
 def gain(richer: Spread, leaner: Spread) -> float:
@@ -62,7 +72,7 @@ def gain(richer: Spread, leaner: Spread) -> float:
     if len(richer.squares) < 2 * richer.values:
         return math.inf
     seen = richer.squares / (1 - richer.leverage).clamp(min=_LEAST)
-    v = noise(seen, richer.signal).variance(richer.signal)
+    v = variances(seen, richer.signal, NEAR * richer.channels)
     v = v.clamp(min=_NO_MATTER * richer.unit or 1e-300)
     fall = richer.squares.sum() - leaner.squares.sum()
     price = math.log(max(2, len(v))) * ((richer.leverage - leaner.leverage) * v).sum()

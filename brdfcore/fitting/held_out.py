@@ -163,6 +163,16 @@ def _weights(problem: Problem) -> Tensor:
     return problem.data.root_weight.square().expand_as(problem.data.y).sum((0, 1))
 
 
+def typical(squares: Tensor, weights: Tensor, block: Tensor, least: float) -> float:
+    """The geometric mean over the samples of their blocks' errors, each at least `least`, in the residual's unit.
+
+    It falls where the errors of most samples' blocks do. The root mean square is that of one block where none of the
+    others is like it, as the steepest incidence of a paint, which models then miss by as much as chance has it.
+    """
+    errors = _mean(squares, weights, block).sqrt().clamp(min=least)
+    return float((block.bincount() / len(block) * errors.log()).sum().exp())
+
+
 def _squares(problem: Problem, x: Tensor, row: Tensor) -> Tensor:
     """The weighed squares (N,) of the residuals at each sample of the x (K, D) that `row` (N,) names."""
     found, at = [], 0

@@ -10,9 +10,10 @@ from typing import Any
 class Rung:
     """A material that was tried: what it adds or leaves out, how it did, and whether the ladder went on from it.
 
-    error and held_out are root mean squares in the unit of the loss's residual: at the samples fitted to, and at
-    incidences that were left out (held_out.py). `criterion` is that of the richer of the two materials compared less
-    that of the leaner one [1]: below 0 it asks for the richer one (criterion.py); NaN on the first rung.
+    error is the root mean square at the samples fitted to, held_out the geometric mean over the incidences of the root
+    mean square at each when it was left out (held_out.py), both in the unit of the loss's residual. `criterion` is that
+    of the richer of the two materials compared less that of the leaner one [1]: below 0 it asks for the richer one
+    (criterion.py); NaN on the first rung.
     """
 
     effect: str

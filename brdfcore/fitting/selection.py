@@ -1,11 +1,12 @@
 """Which of several materials the data call for: what `bc.fit` does for model="auto" or a list of texts.
 
-A richer material stays only if incidences that were left out are foretold better (held_out.py) and the information
-criterion falls (criterion.py). "auto" climbs from Lambert's term: each effect that is not there yet is tried in turn,
-again and again until none is called for, at last all that are left at once, for two crossed lobes show only together,
-and a lobe may only with its Fresnel factor; then each is left out in turn, the diffuse term too (effects.py). A list
-is walked in the order of its numbers of free values. All rungs see the same samples and the same folds, and each
-starts from where the last one that stayed ended, beside its own scan.
+A richer material stays only if incidences that were left out are foretold better, in the geometric mean of their errors
+(held_out.py), and the information criterion falls, which takes no misfit for noise (criterion.py). "auto" climbs from
+Lambert's term: each effect that is not there yet is tried in turn, again and again until none is called for, at last
+all that are left at once, for two crossed lobes show only together, and a lobe may only with its Fresnel factor; then
+each is left out in turn, the diffuse term too (effects.py). A list is walked in the order of its numbers of free
+values. All rungs see the same samples and the same folds, and each starts from where the last one that stayed ended,
+beside its own scan.
 """
 
 import functools
@@ -25,13 +26,13 @@ from .asked import check, form_of, own, texts
 from .criterion import Spread, gain, spread
 from .effects import AUTO, FAMILIES, PARTS, STEPS, Effects
 from .folds import split
-from .held_out import left_out
+from .held_out import left_out, typical
 from .result import Fit
 from .rung import Rung
 from .search import search
 
 FOLDS = 5
-_ROUNDING = 1e-6  # of an error, or of the criterion: as good as no change
+_ROUNDING = 1e-6  # of a black material's error, of an error, or of the criterion: as good as nothing
 _CLIMB = 20_000  # samples on which materials are told apart; the chosen one is fitted to all
 
 
@@ -61,7 +62,7 @@ class _Ladder:
             chosen = torch.randperm(len(samples), generator=torch.Generator().manual_seed(seed))[:_CLIMB]
             samples = samples.subset(chosen.sort().values)
         self.samples, self.seed, self.say, self.keywords = samples, seed, say, keywords
-        self.fold: Tensor | None = None
+        self.parts: tuple[Tensor, Tensor] | None = None  # the block and the fold of each sample
         self.rungs: list[Rung] = []
         self.known: dict[str, _Tried] = {}
 
@@ -83,18 +84,19 @@ class _Ladder:
             keywords["starts"] += own({"starts": [near]}, self.form(model))["starts"]
         made, (kept,) = planned([self.samples], model, **keywords)
         found = search(made, [kept], self.keywords["loss"], self.keywords.get("optimizer", "auto"), self.seed, _silent)
-        if self.fold is None:
-            self.fold = split(kept, FOLDS, self.seed)[1]
+        self.parts = self.parts or split(kept, FOLDS, self.seed)
+        block, fold = self.parts
         x, problem = found.outcome.x, found.problem
-        squares, weights = left_out(problem, x, self.fold)
+        squares, weights = left_out(problem, x, fold)
         total = float(weights.sum()) or 1.0
+        black = problem.residuals(torch.zeros_like(problem.data.y), problem.data, None)[0].sum()
         one = _Tried(
             model,
             problem.unpack(x[0]),
             problem.size,
             spread(problem, x),
             math.sqrt(float(found.outcome.loss[0]) / total),
-            math.sqrt(float(squares.sum()) / total),
+            typical(squares, weights, block, _ROUNDING * math.sqrt(float(black) / total)),
             time.perf_counter() - begun,
         )
         self.known[model] = one

@@ -118,10 +118,16 @@ class AsyncClient:
         return await self._run(requests.evaluation(material, **directions))
 
     async def albedo(
-        self, material: Material, theta_deg: Any, phi_deg: float = 0.0, tolerance: float = 1e-6
+        self,
+        material: Material,
+        theta_deg: Any,
+        phi_deg: float = 0.0,
+        tolerance: float = 1e-6,
+        *,
+        certificate: bool = False,
     ) -> AlbedoView:
-        """The directional albedos of a material for polar angles [degrees]."""
-        return await self._run(requests.albedo(material, theta_deg, phi_deg, tolerance))
+        """The directional albedos of a material for polar angles [degrees], as `Client.albedo` gives them."""
+        return await self._run(requests.albedo(material, theta_deg, phi_deg, tolerance, certificate=certificate))
 
     async def sphere(self, material: Material, channels: Sequence[str] | None = None, size: int = 160) -> bytes:
         """A lit sphere of a material as the bytes of a PNG file, as `Client.sphere` gives it."""

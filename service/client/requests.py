@@ -169,9 +169,11 @@ def evaluation(material: Material, **directions: Unpack[Directions]) -> Call[Eva
     return read(EvaluationView, "POST", "/v1/evaluate", json={"material": material_of(material), **given})
 
 
-def albedo(material: Material, theta_deg: Any, phi_deg: float, tolerance: float) -> Call[AlbedoView]:
+def albedo(
+    material: Material, theta_deg: Any, phi_deg: float, tolerance: float, *, certificate: bool
+) -> Call[AlbedoView]:
     """A material's albedos."""
-    body = {"theta_deg": plain(theta_deg), "phi_deg": phi_deg, "tolerance": tolerance}
+    body = {"theta_deg": plain(theta_deg), "phi_deg": phi_deg, "tolerance": tolerance, "certificate": certificate}
     return read(AlbedoView, "POST", "/v1/albedo", json={"material": material_of(material), **body})
 
 

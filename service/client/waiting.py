@@ -124,9 +124,20 @@ class Client:
         """
         return self._run(requests.evaluation(material, **directions))
 
-    def albedo(self, material: Material, theta_deg: Any, phi_deg: float = 0.0, tolerance: float = 1e-6) -> AlbedoView:
-        """The directional albedos of a material, given as in `evaluate`, for polar angles [degrees]."""
-        return self._run(requests.albedo(material, theta_deg, phi_deg, tolerance))
+    def albedo(
+        self,
+        material: Material,
+        theta_deg: Any,
+        phi_deg: float = 0.0,
+        tolerance: float = 1e-6,
+        *,
+        certificate: bool = False,
+    ) -> AlbedoView:
+        """The directional albedos of a material, given as in `evaluate`, for polar angles [degrees].
+
+        certificate   whether the answer's `certificate` says if the material could exist
+        """
+        return self._run(requests.albedo(material, theta_deg, phi_deg, tolerance, certificate=certificate))
 
     def sphere(self, material: Material, channels: Sequence[str] | None = None, size: int = 160) -> bytes:
         """A lit sphere of a material, given as in `evaluate`, as a PNG file; `channels` give it its colour."""

@@ -25,6 +25,7 @@ router = APIRouter(prefix="/v1/albedo", tags=["albedo"])
 _JSON = [Depends(json_accepted)]
 _JSON_LIMIT = 2**20  # bytes
 _MOST_INTEGRALS = {1e-7: 1000, 0.0: 100}  # directions times terms for tolerances from these on: up to 20 s of work
+_CERTIFYING = 50  # integrals that take as long as the certificate of one term
 _MOST_CHANNELS = 64  # each may be a lobe of its own
 _TOLERANCE = 1e-6  # where a request states none
 _NPZ = ("application/x-npz", "application/octet-stream")
@@ -53,7 +54,8 @@ async def albedo(request: Request) -> Response:
     asked = await asyncio.to_thread(parsed, AlbedoRequest, content)
     if asked.axes is None:
         loop = asyncio.get_running_loop()
-        answer = await loop.run_in_executor(service.computing, _values, asked)
+        thread = service.aside if asked.certificate else service.computing  # it may take a second
+        answer = await loop.run_in_executor(thread, _values, asked)
         return Response(answer, media_type="application/json")
     response = Response(media_type="application/json")
     job = await asyncio.to_thread(_submitted, request, asked, content)
@@ -110,7 +112,7 @@ def _values(asked: AlbedoRequest) -> str:
     material, theta_deg = material_of(asked.material), asked.theta_deg or []
     tolerance = _TOLERANCE if asked.tolerance is None else asked.tolerance
     most = next(count for least, count in _MOST_INTEGRALS.items() if tolerance >= least)
-    integrals = len(theta_deg) * len(material.form.terms)
+    integrals = (len(theta_deg) + _CERTIFYING * asked.certificate) * len(material.form.terms)
     if integrals > most or material.channels > _MOST_CHANNELS:
         raise ProblemError(
             422,
@@ -121,4 +123,7 @@ def _values(asked: AlbedoRequest) -> str:
     theta = torch.deg2rad(torch.tensor(theta_deg, dtype=torch.float64))
     with torch.no_grad():
         found = bc.albedo(material, theta, math.radians(asked.phi_deg), tolerance)
-    return json.dumps(described(material, theta_deg, asked.phi_deg, found), allow_nan=False)
+    view = described(material, theta_deg, asked.phi_deg, found)
+    if asked.certificate:
+        view["certificate"] = bc.certify(material).to_dict()
+    return json.dumps(view, allow_nan=False)

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from ._base import Body, DirectionPairs, MaterialIn, Range, View
+from .results import CertificateView
 
 
 class ModelView(View):
@@ -67,6 +68,7 @@ class AlbedoRequest(Body):
     tolerance: float | None = Field(
         None, ge=1e-12, le=0.1, description="largest error, as a share of max(1, albedo); 1e-6, and 1e-4 for a table"
     )
+    certificate: bool = Field(False, description="with values: also what a fit's certificate says of the material")
 
     @model_validator(mode="after")
     def _values_or_table(self) -> Self:
@@ -74,6 +76,8 @@ class AlbedoRequest(Body):
             raise ValueError(
                 "Expected either theta_deg, for values, or axes, for a table, to be given. Give exactly one of them."
             )
+        if self.certificate and self.theta_deg is None:
+            raise ValueError("Expected certificate to go with theta_deg, got axes. Ask for values, or leave it out.")
         return self
 
 
@@ -90,6 +94,7 @@ class AlbedoView(View):
     method: str
     evaluations: int = Field(description="directions at which lobes were evaluated")
     seconds: float
+    certificate: CertificateView | None = Field(None, description="of the material, where it was asked for")
 
 
 class SphereRequest(Body):

@@ -24,7 +24,7 @@ class CertificateView(View):
     energy_conserving: bool
     decided: bool = Field(description="whether the claimed error leaves no doubt of that")
     max_albedo: float | None = Field(description="the largest directional albedo [1]")
-    error: float = Field(description="claimed for it [1]")
+    error: float | None = Field(description="claimed for it [1]")
     at_theta_deg: float = Field(description="where it is; 90 is the limit towards grazing")
     at_phi_deg: float
     channel: int
@@ -61,7 +61,7 @@ class RungView(View):
     effect: str
     model: str
     error: float | None = Field(description="root mean square of the loss's residuals")
-    held_out: float | None = Field(description="the same at incidences that were left out")
+    held_out: float | None = Field(description="the same at incidences that were left out, their geometric mean")
     criterion: float | None = Field(description="below 0 it asks for the richer of the two materials compared [1]")
     parameters: int
     seconds: float

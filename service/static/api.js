@@ -1,6 +1,8 @@
 /** The service: requests with the key, errors as its sentences, and a job's events. */
 
 const KEY = "brdf-api-key";
+const AGAIN = [408, 429, 500, 502, 503, 504]; // refusals that may be over soon
+const LONGEST = 10_000; // between two attempts [ms]
 
 /** An error that the service tells in one sentence. */
 export class Refusal extends Error {
@@ -49,7 +51,7 @@ export async function ask(path, options = {}) {
     const answer = await sent(path, { ...rest, headers, ...(json === undefined ? {} : { body: JSON.stringify(json) }) });
     if (answer.ok) return answer;
     if (answer.status !== 401) throw new Refusal(answer.status, await answer.json().catch(() => ({})));
-    await askForKey();
+    if (sessionStorage.getItem(KEY) === key) await askForKey(); // else somebody has given another one meanwhile
   }
 }
 
@@ -67,35 +69,47 @@ async function sent(path, options) {
 }
 
 /**
- * The JSON that a path answers with.
+ * The JSON that a path answers with; throws where it comes after the signal that the request carries has been given.
  * @param {string} path
  * @param {RequestInit & {json?: unknown}} options
  * @returns {Promise<any>}
  */
 export async function get(path, options = {}) {
-  return (await ask(path, options)).json();
+  const found = await (await ask(path, options)).json();
+  options.signal?.throwIfAborted();
+  return found;
 }
 
 /**
- * Every event of a fit, until it has ended; a stream that breaks is taken up again.
+ * A fit that has ended, after every event of it on the way; what is lost on the way is told, and asked for again.
  * @param {string} id
  * @param {(event: any) => void} hear
+ * @param {(error: unknown) => void} lost is told why nothing is heard, and null once it is heard again
  * @param {AbortSignal} signal
+ * @returns {Promise<any>}
  */
-export async function follow(id, hear, signal) {
-  for (let last = "", over = false; !over && !signal.aborted; ) {
+export async function followed(id, hear, lost, signal) {
+  let last = "";
+  let over = false;
+  for (let pause = 500; ; pause = Math.min(2 * pause, LONGEST)) {
     try {
+      if (over) return await get(`/v1/fits/${id}`, { signal });
       const headers = { accept: "text/event-stream", ...(last ? { "last-event-id": last } : {}) };
       const answer = await ask(`/v1/fits/${id}/events`, { headers, signal });
+      lost(null);
       for await (const event of events(/** @type {ReadableStream} */ (answer.body))) {
+        signal.throwIfAborted();
         last = event.id || last;
         over = event.name !== "progress";
+        pause = 500;
         hear(event.data);
       }
+      if (over) continue;
     } catch (error) {
-      if (signal.aborted || error instanceof Refusal) throw error;
+      if (signal.aborted || (error instanceof Refusal && !AGAIN.includes(error.status))) throw error;
+      lost(error);
     }
-    if (!over) await new Promise((done) => setTimeout(done, 1000));
+    await new Promise((done) => setTimeout(done, pause));
   }
 }
 

@@ -14,14 +14,18 @@ const LOSSES = {
 };
 const AT_FIRST = ["ward_bounded", "ggx"];
 
+let asking = false; // while the service has not yet accepted what was asked for
+
 /** Fill the form from the service's own lists, and fit on its word. */
 export async function install() {
   for (const [value, text] of Object.entries(LOSSES)) at("loss").append(made("option", { value }, text));
   at("find-model").addEventListener("input", filter);
+  at("find-model").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && event.preventDefault()); // it finds, and fits nothing
   at("choose").addEventListener("submit", begin);
   at("choose").addEventListener("change", ready);
   at("text").addEventListener("input", ready);
   on("dataset", ready);
+  on("pending", ready);
   state.models = (await get("/v1/models")).items;
   const isDiffuse = (/** @type {any} */ model) => named(model, "kd");
   const lobes = state.models.filter((model) => !isDiffuse(model));
@@ -53,7 +57,8 @@ export function offerAuto() {
 
 function filter() {
   const wanted = at("find-model").value.trim().toLowerCase();
-  for (const label of at("lobes").querySelectorAll("label")) label.hidden = !label.textContent.toLowerCase().includes(wanted);
+  for (const label of at("lobes").querySelectorAll("label")) // what will be fitted stays in sight
+    label.hidden = !label.textContent.toLowerCase().includes(wanted) && !label.querySelector("input").checked;
 }
 
 /** @returns {string[]} the models' texts, each once */
@@ -67,9 +72,10 @@ function texts() {
 
 function ready() {
   const count = texts().length;
-  at("start").disabled = state.dataset === null || count === 0;
+  const missing = state.pending || (state.dataset === null ? "Choose a measurement first." : count === 0 ? "Choose a model." : "");
+  at("start").disabled = asking || missing !== "";
   at("start").textContent = count > 1 ? `Fit ${count} models` : "Fit";
-  at("start-hint").textContent = state.dataset === null ? "Choose a measurement first." : count === 0 ? "Choose a model." : "";
+  at("start-hint").textContent = missing;
 }
 
 /** @param {Event} event */
@@ -77,10 +83,15 @@ async function begin(event) {
   event.preventDefault();
   if (state.dataset === null) return;
   complain("choose-error", null);
+  asking = true;
+  ready();
   const common = { dataset: state.dataset.id, loss: at("loss").value, conserve_energy: at("conserve").checked };
   try {
     await submit(texts().map((model) => ({ ...common, model })));
   } catch (error) {
     complain("choose-error", error);
+  } finally {
+    asking = false;
+    ready();
   }
 }

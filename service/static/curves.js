@@ -53,7 +53,7 @@ export async function drawResiduals(f) {
     yaxis: { title: { text: "difference [% of their mean]" } },
   });
   at("residuals-title").textContent = "Model less measurement, by angle"
-    + (samples.stride * step > 1 ? ` (one of ${samples.stride * step} samples)` : "");
+    + (samples.stride * step > 1 ? ` (one in ${samples.stride * step} samples)` : "");
 }
 
 /**

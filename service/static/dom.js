@@ -46,15 +46,35 @@ export function table(caption, titles, rows) {
   );
 }
 
+/** A material's text that may be broken where its options begin, too. @param {string} text @returns {HTMLElement} */
+export function breakable(text) {
+  const [first, ...rest] = text.split("(");
+  return made("span", {}, first, ...rest.flatMap((part) => ["(", made("wbr"), part]));
+}
+
+/** @type {Map<string, Map<string, string>>} what stands where, and from where it came */
+const complaints = new Map();
+
 /**
- * Show an error in words where it arose, or take it back.
+ * Show an error in words where it arose, or take it back. What was given up for something newer is no error.
  * @param {string} id of the element
  * @param {unknown} error null for none
+ * @param {string} source of several that complain in one element, each takes back its own
  */
-export function complain(id, error) {
+export function complain(id, error, source = "") {
+  if (error instanceof DOMException && error.name === "AbortError") return;
+  const all = complaints.get(id) ?? new Map();
+  complaints.set(id, all);
+  if (error === null) all.delete(source);
+  else all.set(source, inWords(error));
   const element = at(id);
-  element.hidden = error === null;
-  element.textContent = error instanceof Error ? error.message : String(error ?? "");
+  element.hidden = all.size === 0;
+  element.textContent = [...new Set(all.values())].join("\n");
+}
+
+/** @param {unknown} error @returns {string} */
+export function inWords(error) {
+  return error instanceof Error ? error.message : String(error);
 }
 
 /**

@@ -24,7 +24,7 @@ function plotly() {
 /** Plotly sets style attributes as text, which the security policy forbids; through the object model it is allowed. */
 function writeStylesAsObjects() {
   const plain = Element.prototype.setAttribute;
-  Element.prototype.setAttribute = function (name, value) {
+  Element.prototype.setAttribute = function (/** @type {string} */ name, /** @type {string} */ value) {
     if (name === "style") /** @type {any} */ (this).style.cssText = value;
     else plain.call(this, name, value);
   };
@@ -47,7 +47,7 @@ export function colours() {
   const style = getComputedStyle(document.documentElement);
   const named = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim();
   return {
-    ink: named("ink"), soft: named("soft"), line: named("line"), card: named("card"), accent: named("accent"), bad: named("bad"),
+    ink: named("ink"), soft: named("soft"), line: named("line"), bad: named("bad"),
     series: Array.from({ length: SERIES }, (_, k) => named(`series-${k}`)),
   };
 }
@@ -71,14 +71,4 @@ export async function draw(element, traces, layout) {
   }
   await library.react(element, traces, whole, { displayModeBar: false, responsive: true });
   await new Promise((done) => setTimeout(done)); // figures that are drawn together do not make one long stall
-}
-
-/**
- * A drawn figure as an SVG file.
- * @param {HTMLElement} element
- * @returns {Promise<Blob>}
- */
-export async function svg(element) {
-  const address = await (await plotly()).toImage(element, { format: "svg", width: 800, height: 520 });
-  return new Blob([decodeURIComponent(address.slice(address.indexOf(",") + 1))], { type: "image/svg+xml" });
 }

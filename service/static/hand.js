@@ -2,8 +2,7 @@
 
 import { submit } from "./jobs.js";
 import { at, complain, made, shown } from "./dom.js";
-import { THETAS } from "./curves.js";
-import { changed, chosen, ofChannel, on, state, valuesOf } from "./state.js";
+import { alter, chosen, ofChannel, on, state, valuesOf } from "./state.js";
 
 const STEPS = 500;
 
@@ -45,8 +44,7 @@ function slider(fit, key) {
     input.setAttribute("aria-valuetext", shown(chosenValue));
     const before = valuesOf(fit)[key];
     const after = Array.isArray(before) ? before.map((one, k) => (k === state.channel ? chosenValue : one)) : chosenValue;
-    state.values = { ...state.values, [key]: after };
-    changed("values");
+    alter({ ...state.values, [key]: after });
   });
   return made("label", { for: input.id, title: fit.result.units[key] ?? key }, made("b", {}, key), number, input);
 }
@@ -69,38 +67,36 @@ function range(fit, key, value) {
 }
 
 function reset() {
-  state.values = null;
-  complain("look-error", null);
+  alter(null);
   build();
-  changed("values");
+  at("as-fitted").focus();
 }
 
 async function fitAgain() {
   const fit = chosen();
   if (fit === null) return;
   complain("hand-error", null);
-  const { samples, model, ...options } = fit.request;
+  const button = at("again");
+  button.disabled = true; // a second press would ask for the same
+  const { samples, model, models, ...options } = fit.request;
   const free = Object.entries(valuesOf(fit)).filter(([key]) => !(key in options.fixed));
   const given = Object.fromEntries(Object.entries(options).filter(([, value]) => value !== null));
-  const named = model === "auto" || model === null ? fit.result.model : model;
   try {
-    await submit([{ ...given, models: undefined, model: named, starts: [Object.fromEntries(free)] }]);
+    await submit([{ ...given, model: model === "auto" ? fit.result.model : model, starts: [Object.fromEntries(free)] }]);
   } catch (error) {
     complain("hand-error", error);
+  } finally {
+    button.disabled = false;
   }
 }
 
 /**
- * Say what the values by hand mean.
- * @param {(number | null)[]} albedos at THETAS
+ * Say what the values mean: whether the material could exist, and how far it is from the samples.
+ * @param {string} verdict of its certificate
  * @param {number} error now [1/sr]
  * @param {number} fitted as it was fitted [1/sr]
  */
-export function tell(albedos, error, fitted) {
-  const rows = albedos.map((value) => value ?? Infinity);
-  const largest = Math.max(...rows);
-  const where = THETAS[rows.indexOf(largest)];
-  const energy = largest <= 1 ? `Conserves energy up to 89°: albedo at most ${shown(largest)}, at ${where}°.` : `Creates energy: albedo ${shown(largest)} at ${where}°.`;
+export function tell(verdict, error, fitted) {
   const much = Number.isFinite(error) ? ` Error (cosine_rms) ${shown(error)}${state.values === null ? "" : `, fitted ${shown(fitted)}`} 1/sr.` : "";
-  at("hand-said").textContent = energy + much;
+  at("hand-said").textContent = verdict + much;
 }

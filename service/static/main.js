@@ -3,21 +3,24 @@
 import * as choice from "./choice.js";
 import { at, complain } from "./dom.js";
 import * as earlier from "./earlier.js";
+import * as facts from "./facts.js";
 import { prepare } from "./figures.js";
 import * as hand from "./hand.js";
-import { open } from "./jobs.js";
+import * as jobs from "./jobs.js";
 import * as key from "./key.js";
 import * as look from "./look.js";
 import * as measurement from "./measurement.js";
 import * as offers from "./offers.js";
 import * as result from "./result.js";
 import * as sphere from "./sphere.js";
-import { state } from "./state.js";
+import { on, present, state } from "./state.js";
 import * as take from "./take.js";
 import * as where from "./where.js";
 
 key.install();
 measurement.install();
+facts.install();
+jobs.install();
 result.install();
 sphere.install();
 hand.install();
@@ -25,6 +28,7 @@ look.install();
 take.install();
 where.install();
 within();
+on("dataset", () => complain("link-error", null));
 window.addEventListener("hashchange", linked);
 await choice.install().catch((error) => complain("choose-error", error));
 await linked();
@@ -32,10 +36,14 @@ await earlier.install();
 prepare();
 await offers.install().catch(() => undefined); // without it the page offers less
 
-/** Show the fits that the address names, as #fit=ID or #fit=ID,ID. */
+/** Show the fits that the address names, as #fit=ID or #fit=ID,ID; none where it names none. */
 async function linked() {
-  const ids = new URLSearchParams(location.hash.slice(1)).get("fit")?.split(",").filter(Boolean) ?? [];
-  if (ids.length > 0 && ids.join() !== [...state.fits.keys()].join()) await open(ids);
+  if (location.hash && !location.hash.startsWith("#fit=")) return;
+  const ids = location.hash.slice("#fit=".length).split(",").filter(Boolean);
+  complain("link-error", null);
+  if (ids.join() === [...state.fits.keys()].join()) return;
+  if (ids.length === 0) return present([]);
+  await jobs.open(ids).catch((error) => complain("link-error", error));
 }
 
 /** Links within the page move the view, and leave the address to name the fits. */

@@ -1,6 +1,6 @@
 /** Step 4: what came out, the models ranked side by side and the chosen one in full. */
 
-import { at, made, shown, table } from "./dom.js";
+import { at, breakable, made, shown, table } from "./dom.js";
 import { SERIES } from "./figures.js";
 import { choose, chosen, on, ranked, state } from "./state.js";
 
@@ -48,7 +48,7 @@ function minimised({ loss, chi_square }) {
 /** @param {import("./state.js").Fit} fit @param {number} rank from 0, which is the colour of its curves */
 function choice(fit, rank) {
   const radio = made("input", { type: "radio", name: "chosen-fit", checked: fit.id === state.chosen, onchange: () => choose(fit.id) });
-  return made("label", { class: "choice code" }, radio, made("span", { class: `swatch swatch-${rank % SERIES}` }), made("span", {}, fit.result.model));
+  return made("label", { class: "choice code" }, radio, made("span", { class: `swatch swatch-${rank % SERIES}` }), breakable(fit.result.model));
 }
 
 /** @param {number | null} value @param {boolean} best */
@@ -62,6 +62,7 @@ function energy(certificate) {
   return certificate.energy_conserving ? made("span", { class: "good" }, "conserves") : made("span", { class: "bad" }, "creates");
 }
 
+/** @type {Record<string, string>} */
 const ENDS = { converged: "Converged. ", undetermined: "Converged, with values left free. ", stopped_early: "Stopped early. " };
 
 function detail() {

@@ -1,13 +1,14 @@
 /** The lobe in space, drawn on a canvas: a mesh seen from a point that drags and arrow keys move. */
 
 import { RINGS, SPOKES, vector } from "./directions.js";
-import { at } from "./dom.js";
+import { at, made } from "./dom.js";
 import { colours } from "./figures.js";
 import { radius } from "./scale.js";
 import { state } from "./state.js";
 
 const DEGREE = Math.PI / 180;
 const SKIN = [64, 128, 214]; // red, green and blue, readable on light and on dark
+const EDGE = 6; // pixels that stay free
 const view = { turn: -60, height: 24 }; // where the eye is [degrees]
 /** @type {{vectors: number[][], f: (number | null)[]}} */
 let mesh = { vectors: [], f: [] };
@@ -42,22 +43,36 @@ export function drawSolid(vectors, f) {
 /** Draw the mesh as it is seen now. */
 export function paint() {
   const canvas = at("solid");
-  const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
-  if (wide === 0 || mesh.f.length === 0) return;
+  if (canvas.clientWidth > 0) painted(canvas, mesh);
+}
+
+/** A lobe as one is seen now, as a PNG file. @param {typeof mesh} lobe @returns {Promise<Blob>} */
+export function picture(lobe) {
+  const canvas = made("canvas");
+  painted(canvas, lobe);
+  return new Promise((done) => canvas.toBlob(done));
+}
+
+/** @param {HTMLCanvasElement} canvas @param {typeof mesh} lobe */
+function painted(canvas, { vectors, f }) {
+  if (f.length === 0) return;
+  const { clientWidth: wide, clientHeight: high } = at("solid");
   const dots = window.devicePixelRatio || 1;
-  if (canvas.width !== Math.round(wide * dots)) [canvas.width, canvas.height] = [Math.round(wide * dots), Math.round(high * dots)];
-  const pen = canvas.getContext("2d");
+  const [width, height] = [Math.round(wide * dots), Math.round(high * dots)];
+  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   pen.setTransform(dots, 0, 0, dots, 0, 0);
   pen.clearRect(0, 0, wide, high);
-  const size = Math.min(wide / 2.2, high / 1.35);
+  const low = Math.sin(view.height * DEGREE); // how far below the normal's foot the horizon is seen
+  const size = Math.min(wide / 2.2, (high - 2 * EDGE) / (1 + low));
   const seen = camera();
   const place = (/** @type {number[]} */ p) => {
     const [x, y, depth] = seen(p);
-    return [wide / 2 + size * x, 0.74 * high - size * y, depth];
+    return [wide / 2 + size * x, (high + size * (1 - low)) / 2 - size * y, depth];
   };
   ground(pen, place);
-  const r = radius(state.scale, Math.max(...mesh.f.map((value) => value ?? 0)));
-  const points = mesh.vectors.map((direction, k) => direction.map((part) => part * r(mesh.f[k])));
+  const r = radius(state.scale, Math.max(...f.map((value) => value ?? 0)));
+  const points = vectors.map((direction, k) => direction.map((part) => part * r(f[k])));
   const placed = points.map(place);
   const faces = [];
   for (let ring = 0; ring < RINGS; ring++) {

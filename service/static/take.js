@@ -2,8 +2,16 @@
 
 import { ask, hasKey } from "./api.js";
 import { at, complain, made, save } from "./dom.js";
-import { svg } from "./figures.js";
+import { lobeOf } from "./look.js";
+import { picture } from "./solid.js";
+import { pictured } from "./sphere.js";
 import { chosen, nameOf, on, state } from "./state.js";
+
+/** What a request for a fit says where nothing is asked for; the rest of it is told. @type {Record<string, unknown>} */
+const DEFAULTS = {
+  loss: "cosine", optimizer: "auto", fixed: {}, gray: [], per_channel: [], seed: 0, bounds: {}, starts: [],
+  robust: null, robust_scale: null, max_theta_deg: null, conserve_energy: false,
+};
 
 /** @type {string[]} formats of GET /v1/fits/{id}/export/{format}, where this service has it */
 let formats = [];
@@ -17,6 +25,7 @@ export function offerExports(names) {
 /** Show what there is for the chosen fit. */
 export function install() {
   on("chosen", show);
+  on("values", () => (at("as-it-was").hidden = state.values === null));
 }
 
 function show() {
@@ -24,25 +33,30 @@ function show() {
   at("take").hidden = fit === null;
   if (fit === null) return;
   const link = `${location.origin}/#fit=${fit.job ?? fit.id}`;
-  const figures = ["lobes", "albedo"].flatMap((name) => ["svg", "png"].map((kind) => button(`${name} ${kind.toUpperCase()}`, () => plot(fit, name, kind))));
+  const address = made("a", { href: link, id: "permalink" }, link);
+  const figures = ["lobes", "albedo", "residuals"].flatMap((name) => ["svg", "png"].map((kind) => button(`${name} ${kind.toUpperCase()}`, () => plot(fit, name, kind))));
   at("taking").replaceChildren(
-    made("div", { class: "row" },
-      made("b", {}, "Files"),
+    taken("Files",
       button("Report", async () => save(new Blob([fit.result.report], { type: "text/plain" }), `${fit.id}.txt`)),
       button("Result as JSON", async () => save(new Blob([JSON.stringify(fit.result, null, 2)], { type: "application/json" }), `${fit.id}.json`)),
       ...formats.map((format) => offered(fit, format)),
     ),
-    ...(drawable(fit) ? [] : [made("p", { class: "hint" }, `The files of other programs hold one channel, or red, green and blue; this material has ${fit.result.channels.length}.`)]),
-    made("div", { class: "row" },
-      made("b", {}, "Figures"), ...figures,
-      button("residuals SVG", async () => save(await svg(at("residuals")), `${fit.id}_residuals.svg`)),
-      button("lobe in space PNG", () => picture("solid", `${fit.id}_lobe.png`)),
-      button("sphere PNG", () => picture("sphere", `${fit.id}_sphere.png`)),
+    ...(drawable(fit) ? [] : [taken("", made("p", { class: "hint" }, `The files of other programs hold one channel, or red, green and blue; this material has ${fit.result.channels.length}.`))]),
+    taken("Figures", ...figures,
+      button("lobe in space PNG", async () => save(await picture(await lobeOf(fit)), `${fit.id}_lobe.png`)),
+      button("sphere PNG", async () => save(await pictured(fit, fit.result.material.values), `${fit.id}_sphere.png`)),
     ),
-    made("div", { class: "row" }, made("b", {}, "Link"), made("a", { href: link, id: "permalink" }, link), copy("Copy the link", () => link)),
+    made("p", { class: "hint", id: "as-it-was", hidden: state.values === null }, "All of this is of the fit as it was fitted. What you change by hand is in it once you fit again from there."),
+    taken("Link", address, copy("Copy the link", address)),
     made("div", { class: "pair" }, code("Python", python(fit)), code("curl", curl(fit))),
+    made("p", { class: "hint" }, `${fit.request.dataset === null ? "SAMPLES stands for the samples, as the request held them" : "FILE stands for the measured file"}${hasKey() ? ", KEY for the key" : ""}.`),
     made("p", { class: "hint", role: "status", id: "copied" }),
   );
+}
+
+/** @param {string} title @param {...Node} things */
+function taken(title, ...things) {
+  return made("div", { class: "taken" }, made("b", {}, title), made("div", { class: "row" }, ...things));
 }
 
 /** @param {string} text @param {() => Promise<void>} action */
@@ -67,16 +81,11 @@ function offered(fit, format) {
   return element;
 }
 
-/** @param {string} id of a canvas @param {string} name of the file */
-async function picture(id, name) {
-  at(id).toBlob((/** @type {Blob} */ content) => save(content, name));
-}
-
 /** @param {import("./state.js").Fit} fit @param {string} name @param {string} kind */
 async function plot(fit, name, kind) {
   const asked = new URLSearchParams({ channel: fit.result.channels[state.channel], rank: String(fit.rank ?? 1) });
   if (name === "albedo") asked.set("phi_deg", String(state.phi));
-  else asked.append("scale", state.scale), asked.append("theta_i_deg", String(state.theta));
+  if (name === "lobes") asked.append("scale", state.scale), asked.append("theta_i_deg", String(state.theta));
   const answer = await ask(`/v1/fits/${fit.job ?? fit.id}/plots/${name}.${kind}?${asked}`);
   save(await answer.blob(), `${fit.id}_${name}.${kind}`);
 }
@@ -90,48 +99,57 @@ async function exported(fit, format) {
 
 /** @param {string} title @param {string} text */
 function code(title, text) {
-  const head = made("div", { class: "head" }, made("h3", {}, title), copy(`Copy the ${title} lines`, () => text));
-  return made("div", {}, head, made("pre", { tabindex: 0, "aria-label": `${title} lines` }, text));
+  const lines = made("pre", { tabindex: 0, "aria-label": `${title} lines` }, text);
+  return made("div", {}, made("div", { class: "head" }, made("h3", {}, title), copy(`Copy the ${title} lines`, lines)), lines);
 }
 
-/** @param {string} text @param {() => string} content */
-function copy(text, content) {
+/** A button that copies the text of an element; where the browser forbids that, it is left selected. @param {string} text @param {HTMLElement} element */
+function copy(text, element) {
   return button(text, async () => {
-    await navigator.clipboard.writeText(content());
-    at("copied").textContent = "Copied.";
+    try {
+      await navigator.clipboard.writeText(element.textContent ?? "");
+      at("copied").textContent = "Copied.";
+    } catch {
+      getSelection()?.selectAllChildren(element);
+      at("copied").textContent = "The browser lets only pages from https or from this machine copy. The text is selected: press Ctrl+C, or ⌘C.";
+    }
   });
 }
 
-/** Options of a request that are not as they are by default. @param {any} request */
-function told(request) {
-  const { loss, conserve_energy, max_theta_deg, seed, fixed, starts } = request;
-  return {
-    ...(loss === "cosine" ? {} : { loss }),
-    ...(conserve_energy ? { conserve_energy } : {}),
-    ...(max_theta_deg === null ? {} : { max_theta_deg }),
-    ...(seed === 0 ? {} : { seed }),
-    ...(Object.keys(fixed).length ? { fixed } : {}),
-    ...(starts.length ? { starts } : {}),
-  };
+/** What a request asks for beyond what is so by default. @param {any} request @returns {[string, unknown][]} */
+function told({ dataset, samples, model, models, ...options }) {
+  return Object.entries(options).filter(([name, value]) => JSON.stringify(value) !== JSON.stringify(DEFAULTS[name]));
+}
+
+/** What was declared of the measured file. @returns {[string, string | boolean][]} */
+function declared() {
+  return /** @type {any} */ (Object.entries(state.dataset?.declared ?? {}).filter(([, value]) => value !== null && value !== false));
 }
 
 /** @param {import("./state.js").Fit} fit */
 function python(fit) {
   const literal = (/** @type {unknown} */ value) => (value === true ? "True" : JSON.stringify(value));
-  const options = Object.entries(told(fit.request)).map(([name, value]) => `, ${name}=${literal(value)}`).join("");
+  const options = [["model", nameOf(fit)], ...declared(), ...told(fit.request)].map(([name, value]) => `${name}=${literal(value)}`);
+  const given = [fit.request.dataset === null ? "SAMPLES" : '"FILE"', ...options];
+  const short = given.join(", ");
   const key = hasKey() ? ", api_key=KEY" : "";
   return `from service.client import Client
 
 with Client("${location.origin}"${key}) as client:
-    fit = client.fit("FILE", model="${nameOf(fit)}"${options})
+    fit = client.fit(${short.length < 52 ? short : given.map((one) => `\n        ${one},`).join("") + "\n    "})
     print(fit.report())`;
 }
 
 /** @param {import("./state.js").Fit} fit */
 function curl(fit) {
+  const { dataset } = fit.request;
+  const quoted = (/** @type {string} */ text) => `'${text.replaceAll("'", "'\\''")}'`;
   const key = hasKey() ? " -H 'Authorization: Bearer KEY'" : "";
-  const body = JSON.stringify({ dataset: fit.request.dataset ?? "DATASET", model: nameOf(fit), ...told(fit.request) }, null, 1).replaceAll("\n", "").replaceAll("{ ", "{");
-  return `curl -sS${key} --data-binary @FILE ${location.origin}/v1/datasets
-curl -sS${key} -H 'Prefer: wait=30' -H 'Content-Type: application/json' \\
-     ${location.origin}/v1/fits -d '${body}'`;
+  const query = new URLSearchParams(declared().map(([name, value]) => [name, String(value)]));
+  const upload = `curl -sS${key} --data-binary @FILE ${quoted(`${location.origin}/v1/datasets${query.size ? "?" : ""}${query}`)}\n`;
+  const data = dataset === null ? { samples: "SAMPLES" } : { dataset };
+  const fields = Object.entries({ ...data, model: nameOf(fit), ...Object.fromEntries(told(fit.request)) });
+  const body = `{${fields.map(([name, value]) => `\n  ${JSON.stringify(name)}: ${JSON.stringify(value)}`).join()}}`;
+  return `${dataset === null ? "" : upload}curl -sS${key} -H 'Prefer: wait=30' -H 'Content-Type: application/json' \\
+     ${location.origin}/v1/fits -d ${quoted(body)}`;
 }

@@ -224,6 +224,18 @@ def test_a_masking_that_is_smooth_but_not_analytic_is_a_reference_too():
     assert found.evaluations < 5e6  # of 4e7 where more rays are to make up for too few nodes on them
 
 
+def test_rays_are_dense_where_they_can_be_at_the_horizon_itself():
+    """The wi whose masking changes is opposite to wo there to rounding, and has no half vector."""
+    form, values = prepared("ggx(anisotropic, ks=1, ax=0.05, ay=0.5)")
+    for co in (1e-8, 1e-10):
+        precise, plain = (
+            bc.energy.of_form(form, values, torch.tensor(co).double(), torch.tensor(0.0), tolerance)
+            for tolerance in (1e-12, 1e-7)
+        )
+        assert precise.met
+        assert float(precise.values) == pytest.approx(float(plain.values), abs=1e-7)
+
+
 @pytest.mark.parametrize("text", LOBES[1:6])
 def test_rays_agree_with_the_tests_own_disc(text):
     """The Cartesian slope-disc quadrature that the models' own tests trust, which meets a kink anywhere: 1e-5."""

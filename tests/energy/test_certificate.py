@@ -284,10 +284,10 @@ def test_no_dense_scan_contradicts_a_certificate_in_many_cases(choice, number):
     contradict(choice, number, 60, 13)
 
 
-@pytest.mark.full
-def test_a_lopsided_limit_may_take_most_of_what_may_be_spent():
+def test_the_limit_of_a_lopsided_lobe_with_separable_masking_is_found():
     found = bc.certify(bc.material("ggx(separable, schlick, anisotropic, ks=0.897, f0=0.136, ax=0.061, ay=1.204)"))
-    assert found.error <= 1e-5
+    assert found.error <= found.tolerance
+    assert found.evaluations < 4e6  # of 4e7 without rays that are dense where its masking changes
 
 
 def contradict(choice: bc.Model, number: int, angles: int, azimuths: int) -> None:

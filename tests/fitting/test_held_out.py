@@ -12,6 +12,7 @@ from fit_cases import TRUE, directions, measured_from
 import brdfcore as bc
 from brdfcore.errors import ParameterError
 from brdfcore.fitting.folds import blocks, dealt
+from brdfcore.fitting.held_out import typical
 from brdfcore.fitting.losses import Scales
 
 MODEL = "lambert + ward_bounded(isotropic)"
@@ -144,3 +145,16 @@ def test_folds_conserve_energy_where_that_is_asked_for() -> None:
     fractions = [p.fraction for p in seen]
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1
+
+
+def test_the_typical_error_is_a_geometric_mean_that_no_block_decides() -> None:
+    """Blocks of root mean squares 1 and 4, alike in samples, make 2; a block counts as its samples do."""
+    block = torch.tensor([0, 0, 1, 1])
+    squares, weights = torch.tensor([2.0, 0.0, 10.0, 22.0]).double(), torch.ones(4, dtype=torch.float64)
+    assert typical(squares, weights, block, 0.0) == pytest.approx(2)
+    assert typical(squares, 4 * weights, block, 0.0) == pytest.approx(1)
+    more = torch.cat([squares, torch.tensor([3e6, 0.0, 0.0]).double()])
+    found = typical(more, torch.ones(7, dtype=torch.float64), torch.tensor([0, 0, 1, 1, 2, 2, 2]), 0.0)
+    assert found == pytest.approx(4 ** (2 / 7) * 1000 ** (3 / 7))
+    assert typical(torch.zeros(4).double(), weights, block, 0.0) == 0
+    assert typical(0 * squares + torch.tensor([2.0, 0, 0, 0]), weights, block, 0.25) == pytest.approx(0.5)

@@ -58,7 +58,10 @@ def test_everything_that_can_be_asked(settings: Settings, tmp_path: pathlib.Path
         queued = await client.fit(measured_diffuser(), model="lambert + kurt", wait=False)
         assert (await queued.wait(20)).job_status == "succeeded"
         assert len(await client.models()) > 10
-        assert (await client.albedo("lambert(kd=0.3)", [0, 60])).values == [[0.3], [0.3]]
+        found = await client.albedo("lambert(kd=0.3)", [0, 60], certificate=True)
+        assert found.values == [[0.3], [0.3]]
+        assert found.certificate is not None
+        assert found.certificate.energy_conserving
         angles = {"theta_i_deg": [30.0], "phi_i_deg": [0.0], "theta_o_deg": [30.0], "phi_o_deg": [180.0]}
         assert (await client.evaluate("lambert(kd=0.3)", **angles)).f[0][0] == pytest.approx(0.3 / 3.14159265, rel=1e-6)
         table = await client.albedo_table("ward_bounded(isotropic)", {"ward_bounded.a": (0.1, 0.3)}, 1e-2)

@@ -369,6 +369,10 @@ def test_a_material_is_evaluated_and_integrated(client: Client) -> None:
     wi, wo = (torch.tensor([w], dtype=torch.float64) for w in ([0.6, 0.0, 0.8], [0.0, 0.0, 1.0]))
     assert client.evaluate(material, wi=wi, wo=wo).f == material.f(wi, wo).tolist()
     found = client.albedo(material, np.array([0.0, 60.0]), phi_deg=10, tolerance=1e-3)
+    assert found.certificate is None
+    told = client.albedo(material, [0.0], certificate=True).certificate
+    assert told is not None
+    assert told.verdict == bc.certify(material).verdict
     theta = torch.deg2rad(torch.tensor([0.0, 60.0], dtype=torch.float64))
     own = bc.albedo(material, theta, tolerance=1e-3).values.tolist()
     assert found.values == [pytest.approx(row, rel=1e-9) for row in own]

@@ -15,6 +15,7 @@ from starlette.testclient import TestClient
 
 import brdfcore as bc
 from service.app import create_app
+from service.schemas import CertificateView
 from service.settings import Settings
 
 TEXT = "lambert(kd=[0.5, 0.2]) + ward_bounded(isotropic, rs=0.3, a=0.2)"
@@ -69,6 +70,17 @@ def test_values_are_the_librarys(http: TestClient, given: str) -> None:
     assert (found["met"], found["method"], found["evaluations"]) == (own.met, own.method, own.evaluations)
     assert (found["theta_deg"], found["phi_deg"], found["tolerance"]) == (VALUES["theta_deg"], 0.0, 1e-4)
     assert (found["material"], found["seconds"] > 0) == (str(material), True)
+
+
+@pytest.mark.parametrize("text", [TEXT, "kurt_eq_13", "lafortune(ks=1, cx=-2, cy=-2, n=1000000)"])
+def test_the_certificate_is_that_of_a_fit(http: TestClient, text: str) -> None:
+    """The last one's claimed error is infinite, which JSON holds as null."""
+    answer = http.post("/v1/albedo", json={"material": text, "theta_deg": [0.0], "tolerance": 0.1, "certificate": True})
+    assert answer.status_code == 200, answer.text
+    own = bc.certify(bc.material(text)).to_dict()
+    assert answer.json()["certificate"] == own | {"seconds": answer.json()["certificate"]["seconds"]}
+    assert CertificateView.model_validate(own).verdict == own["verdict"]
+    assert http.post("/v1/albedo", json=VALUES).json().get("certificate") is None
 
 
 def test_the_azimuth_counts(http: TestClient) -> None:
@@ -190,6 +202,11 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "a loose tolerance": ({"tolerance": 0.5}, "tolerance", "less than or equal to 0.1"),
     "too many angles": ({"theta_deg": [1.0] * 501}, "theta_deg", "at most 1000 angles times terms"),
     "too many for the tolerance": ({"theta_deg": [1.0] * 51, "tolerance": 1e-9}, "theta_deg", "at most 100 angles"),
+    "too many terms to certify": (
+        {"material": " + ".join(["lambert(kd=0)"] * 21), "certificate": True},
+        "theta_deg",
+        "at most 1000 angles times terms",
+    ),
     "too many channels": ({"material": f"lambert(kd={[0.1] * 65})"}, "theta_deg", "64 channels"),
     "an unknown field": ({"theta": [1.0]}, "theta", "Remove it"),
 }
@@ -201,6 +218,7 @@ BAD_AXES: dict[str, tuple[dict[str, Any], str, str]] = {
     "a range outside the box": ({"axes": {"lambert.kd": [0.0, 2.0]}}, "axes", "within [0, 1]"),
     "a range of one number": ({"axes": {"lambert.kd": [0.5]}}, "axes.lambert.kd", "at least 2 items"),
     "a number as range": ({"axes": {"lambert.kd": 0.5}}, "axes.lambert.kd", "array, got 0.5"),
+    "a certificate of a table": ({"certificate": True}, "body", "Expected certificate to go with theta_deg"),
     "axes without names": ({"axes": ["lambert.kd"]}, "axes", "an object"),
 }
 
