@@ -43,6 +43,11 @@ class Data:
             scales or Scales.stacked(y, c),
         )
 
+    @property
+    def counted(self) -> Tensor:
+        """What makes a weighted residual of one: the root of its weight as a factor, 1 where that is 0."""
+        return torch.where(self.root_factor > 0, self.root_factor, 1.0)
+
     def slice(self, begin: int, end: int) -> "Data":
         """The samples from begin to end."""
         return Data(

@@ -17,7 +17,7 @@ Source: Fedorov 1972, exchange of design points; White 1980 for A^-1 B A^-1.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -28,11 +28,12 @@ from ..formats.samples import Samples, angles
 from ..geometry import from_angles
 from .criterion import spread
 from .data import Data
-from .limits import check_max_theta
+from .given import plain, whole
+from .limits import check_angle
 from .losses import LOSSES
-from .plan import Plan
 from .problem import Problem
 from .result import Fit
+from .robust import ROBUST
 from .signal_noise import noise
 
 _STEP = 5.0  # degrees between polar angles
@@ -76,6 +77,16 @@ class NextDirections:
             "information": self.information,
         }
 
+    def __str__(self) -> str:
+        """The directions and the shrinkage as plain text, angles in degrees, a line each."""
+        rows = torch.rad2deg(torch.stack(list(self.angles.values()), -1)).tolist()
+        lines = [f"{'measure next [deg]':<20}" + "".join(f"{name:>10}" for name in self.angles)]
+        lines += [f"{number:<20}" + "".join(f"{angle:>10.4g}" for angle in row) for number, row in enumerate(rows, 1)]
+        lines.append("intervals then, as shares of those now:")
+        for key, value in self.shrinkage.items():
+            lines.append(f"{key:<32}" + ", ".join(f"{share:.3g}" for share in value.reshape(-1).tolist()))
+        return "\n".join(lines)
+
 
 def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -> NextDirections:
     """So many directions, no two alike, whose samples would make the fit's values surest.
@@ -84,11 +95,15 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
 
     Raises ParameterError for a count below 1, an angle out of range, or a fit without a free value.
     """
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        raise ParameterError(f"Expected count to be a whole number from 1 on, got {count!r}. Use 10.", field="count")
-    check_max_theta(max_theta)
-    plan = Plan(fit.form, fit.values, frozenset(fit.fixed), frozenset(fit.gray), frozenset(fit.per_channel), ())
-    problem = Problem(plan, fit.samples, LOSSES[fit.loss])
+    if not isinstance(fit, Fit):
+        raise ParameterError(
+            f"Expected fit to be a Fit, got {type(fit).__name__}. Pass what bc.fit returned.", field="fit"
+        )
+    wanted, max_theta = check_count(count), plain(max_theta)
+    check_angle(max_theta)
+    plan = replace(fit.plan, start=fit.values, starts=())
+    scale = None if fit.robust_scale is None else torch.tensor([fit.robust_scale], dtype=torch.float64)
+    problem = Problem(plan, fit.samples, LOSSES[fit.loss], robust_scale=scale)
     x = problem.pack(fit.values).unsqueeze(0)
     if not problem.size:
         raise ParameterError(
@@ -99,13 +114,21 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
     thin = max(1, math.ceil(len(wi) * problem.size**3 / _WORK))
     wi, wo = wi[::thin], wo[::thin]
     columns, variance = design.candidates(wi, wo)
-    chosen = _exchanged(design, columns, variance, min(count, len(wi)))
+    chosen = _exchanged(design, columns, variance, min(wanted, len(wi)))
     before = design.covariance(design.a, design.b)
     after = design.covariance(*design.joined(columns[chosen], variance[chosen]))
     ratio = (after.diagonal() / before.diagonal()).sqrt()
     shrinkage = {key: ratio[at].reshape(plan.start[key].shape) for key, at in problem.slices.items()}
     information = float(torch.logdet(before) - torch.logdet(after))
     return NextDirections(wi[chosen], wo[chosen], shrinkage, information)
+
+
+def check_count(count: object) -> int:
+    """The number of directions; raises ParameterError where this is none."""
+    wanted = whole(count)
+    if wanted is None or wanted < 1:
+        raise ParameterError(f"Expected count to be a whole number from 1 on, got {count!r}. Use 10.", field="count")
+    return wanted
 
 
 def reachable(samples: Samples, max_theta: float) -> tuple[Tensor, Tensor]:
@@ -147,7 +170,7 @@ class _Design:
             for piece in data.chunks(problem.channels):  # as the leverages stand
                 own = f[..., at : at + len(piece.c)]
                 counted = (piece.root_weight > 0).expand_as(own)
-                squares.append((own - piece.y)[counted].square())
+                squares.append(_counted(problem, own, piece)[counted].square())
                 values.append(own[counted])
                 at += len(piece.c)
             self.noise = noise(torch.cat(squares) / left, torch.cat(values))
@@ -208,6 +231,16 @@ class _Design:
             more_a, more_b = self.with_(some, v)
             found.append(2 * torch.linalg.slogdet(a + more_a)[1] - torch.linalg.slogdet(b + more_b)[1])
         return torch.cat(found)
+
+
+def _counted(problem: Problem, f: Tensor, data: Data) -> Tensor:
+    """What is left of the values beside f (1, C, N), as much as a robust form counts of it."""
+    left = f - data.y
+    if problem.plan.robust is None or problem.robust_scale is None:
+        return left
+    plain = Problem(replace(problem.plan, robust=None), [], problem.loss_kind, data=data)
+    z = (plain.residuals(f, data, None)[1] / (problem.robust_scale * data.counted)).square()
+    return left * ROBUST[problem.plan.robust].functions(z)[1]
 
 
 def _exchanged(design: _Design, columns: Tensor, variance: Tensor, count: int) -> list[int]:

@@ -147,8 +147,7 @@ class Problem:
         if self.plan.robust is None or self.robust_scale is None:
             return r.square(), r, slope
         scale = (self.robust_scale if which is None else self.robust_scale[which]).reshape(-1, 1, 1)
-        counted = torch.where(data.root_factor > 0, data.root_factor, 1.0)
-        rho, r, root = softened(ROBUST[self.plan.robust], scale * counted, r)  # w s^2 rho(r^2 / (w s^2)) for w r^2
+        rho, r, root = softened(ROBUST[self.plan.robust], scale * data.counted, r)  # w s^2 rho(r^2 / (w s^2)) for w r^2
         return rho, r, slope * root
 
     def loss(self, x: Tensor, which: Tensor | None = None) -> Tensor:
@@ -195,6 +194,30 @@ class Problem:
             gradient[at] += (rows @ r.unsqueeze(-1)).squeeze(-1)
             matrix[at] += rows @ rows.mT
         return Gram(loss, self.scatter_vector(gradient), self.scatter_matrix(matrix))
+
+    def gradient(self, x: Tensor, which: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """The loss (S,) of each row and the gradient (S, D) of half of it, as in its normal equations.
+
+        Of one channel no product of matrices is asked for: threads that LAPACK calls in cost more than few samples do.
+        """
+        self.evaluations += len(x)
+        mix, natural, starts = self.mix(x), self.natural(x), len(x)
+        loss = torch.zeros(starts, dtype=torch.float64)
+        right = torch.zeros_like(mix.value)  # (S, C, Q)
+        for at, _, piece in self.data.blocks(starts):
+            own = None if which is None else which[at]
+            data = piece if own is None else piece.rows(own)
+            columns = self.columns.all(rows_of(natural, at), data.g, at.stop - at.start, self.channels)
+            value = mix.value[at]
+            if self.channels == 1:
+                f = (value.unsqueeze(-1) * columns).sum(2)
+                rho, r, slope = self.residuals(f, data, own)
+                right[at] += (columns * (slope * r).unsqueeze(2)).sum(-1)
+            else:
+                rho, r, slope = self.residuals(_mixed(value, columns), data, own)
+                right[at] += (columns @ (slope * r).unsqueeze(-1)).squeeze(-1)
+            loss[at] += rho.sum((1, 2))
+        return loss, self.scatter_vector((mix.slopes * right.unsqueeze(-1)).sum(-2))
 
     def scatter_vector(self, by_channel: Tensor) -> Tensor:
         """(S, C, P) by channel and name, summed into (S, D)."""

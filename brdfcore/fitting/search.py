@@ -30,7 +30,7 @@ SUBSET = 2000  # samples on which starts are told apart; the optimum is always p
 _STARTS = 4  # best points of the scan, which run as one batch; of one shape half of them
 _MANY_STARTS = 16  # the same of two lobes and more, whose optima are many
 _AGAIN = 2  # starts of each of several lobes, whose shapes are searched again beside the best of the others
-_DESCENTS = 2  # starts of Adam and LBFGS, which run one after the other
+_DESCENTS = 2  # starts of Adam and LBFGS
 _POLISH = 300  # their steps on all the data, after the subset
 _NONLINEAR = 6  # starts of a lone lobe under a loss that is not linear in f, whose steps move every reflectance
 _HOPELESS = 2.0  # times the best point's loss, from where a lone lobe's other points lead nowhere else
@@ -136,8 +136,7 @@ def _spread(found: Found) -> Tensor:
     plain = Problem(replace(problem.plan, robust=None), [], problem.loss_kind, data=problem.data)
     data = problem.data.rows(which)
     r = plain.residuals(problem.f(found.outcome.x, data), data, which)[1]
-    counted = data.root_factor > 0
-    size = (r / torch.where(counted, data.root_factor, 1.0)).abs().flatten(1)
+    size = (r / data.counted).abs().flatten(1)
     weight = data.root_factor.square().masked_fill(data.root_weight[:, :1] <= 0, 0).expand_as(r).flatten(1)
     size, order = size.sort(1)
     before = weight.gather(1, order).cumsum(1)
@@ -261,25 +260,19 @@ def _best(loss: Tensor, which: Tensor, materials: int) -> Tensor:
 
 
 def _descents(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: str, seed: int, say: Say) -> Found:
-    """Adam or LBFGS from a few starts one after the other, then from the best on all the data."""
+    """Adam or LBFGS from a few starts, then from the best on all the data."""
     run = {"adam": adam, "lbfgs": lbfgs}[optimizer]
     starts, _ = scan(coarse, _kindred(coarse, few), _DESCENTS, seed)
-    ends: list[Outcome] = []
-    share = 0.9 / starts[..., 0].numel()
-    for material in range(whole.materials):
-        which = torch.tensor([material])
-        runs: list[Outcome] = []
-        for start in starts[material]:
-            done = 0.05 + share * (len(ends) * starts.shape[1] + len(runs))
-            runs.append(run(coarse, start.unsqueeze(0), which, on_step=_tell(say, done, done + share)))
-        best = min(runs, key=lambda outcome: float(outcome.loss[0]))
-        if coarse is not whole:
-            best = run(whole, best.x, which, max_iterations=_POLISH)
-        ends.append(Outcome(best.x, best.loss, best.converged, sum(r.iterations for r in runs)))
-    x, loss, converged, steps, _ = zip(*ends, strict=True)
-    outcome = Outcome(torch.cat(x), torch.cat(loss), torch.cat(converged), sum(steps))
+    materials, each = starts.shape[:2]
+    which = torch.arange(materials).repeat_interleave(each)
+    found = run(coarse, starts.reshape(-1, whole.size), which, on_step=_tell(say, 0.05, 0.7))
+    steps = found.iterations
+    best = found.pick(_best(found.loss, which, materials))
+    if coarse is not whole:
+        best = run(whole, best.x, torch.arange(materials), max_iterations=_POLISH, on_step=_tell(say, 0.7, 0.9))
+        steps += best.iterations
     evaluations = whole.evaluations + (coarse.evaluations if coarse is not whole else 0)
-    return Found(whole, outcome, starts.shape[1], evaluations, sum(steps), optimizer)
+    return Found(whole, best._replace(iterations=steps), each, evaluations, steps, optimizer)
 
 
 def _part(say: Say, begin: float, end: float) -> Say:

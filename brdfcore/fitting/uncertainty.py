@@ -60,7 +60,7 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
         blank = (Unseen.nothing(0),) * len(x)
         return Uncertainty(x, x, x, square, x, none, none, none, none, counted, blank, ((),) * len(x))
     gram = gram or problem.gram(x, which)
-    if not all(bool(part.isfinite().all()) for part in (x, gram.gradient, gram.matrix)):
+    if not all(bool(part.isfinite().all()) for part in (x, gram.loss, gram.gradient, gram.matrix)):
         size = problem.data.y.abs()
         raise SamplesError(
             "Expected values to be of a size whose squares a double holds under this loss, got magnitudes from "

@@ -12,9 +12,10 @@ from .data import stacked_weights
 from .identifiability import name_of, named
 from .levenberg_marquardt import Outcome
 from .losses import root_mean
+from .plan import GRADIENT
 from .problem import Problem
 from .result import Cost, Fit
-from .support import supports, warnings
+from .support import supports, too_bright, warnings
 from .uncertainty import Uncertainty, uncertainty
 
 
@@ -47,6 +48,7 @@ def fits(
     freedom, objectives, ends = known.freedom.tolist(), minima.tolist(), outcome.converged.tolist()
     typical = torch.as_tensor(problem.data.scales.y, dtype=torch.float64).reshape(-1)
     told = warnings(plan, supports(fitted[0]), problem.data.y, typical, problem.loss_kind.name)
+    bright = too_bright(problem, x)
     names = [name_of(problem, at, channels) for at in range(problem.size)]
     covariances = _certain(known.covariance, names)
     of_row = {key: value.reshape(len(x), *plan.start[key].shape).unbind() for key, value in values.items()}
@@ -83,8 +85,9 @@ def fits(
                     freedom[row],
                     converged=ends[row],
                     weighed=weighed,
+                    by_gradient=spent.optimizer in GRADIENT,
                 ),
-                warnings=told[row],
+                warnings=(*told[row], *bright[row]),
                 choices=plan.choices,
                 fixed=tuple(sorted(plan.fixed)),
                 gray=tuple(sorted(plan.gray)),
@@ -160,6 +163,7 @@ def _message(
     *,
     converged: bool,
     weighed: bool,
+    by_gradient: bool,
 ) -> str:
     """What the user must know of a result, in sentences; `held`, `by_chance` and `vague` are by raw position."""
     if not problem.size:
@@ -167,9 +171,8 @@ def _message(
     elif converged:
         parts = ["The optimum was reached; no step gains more than rounding."]
     else:
-        parts = [
-            "The optimizer stopped before the optimum; treat values and intervals with care, or use least_squares."
-        ]
+        advice = "use least_squares" if by_gradient else "give starts near it"
+        parts = [f"The optimizer stopped before the optimum; treat values and intervals with care, or {advice}."]
     on_end = [key for key, at in problem.slices.items() if any(held[at])]
     if on_end:
         where = " in some channel" if problem.channels > 1 else ""
