@@ -1,7 +1,7 @@
 """A fit's result: values with intervals, errors under every loss, a status in words, and what it cost."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -108,7 +108,7 @@ class Fit:
     @cached_property
     def certificate(self) -> Certificate:
         """The largest directional albedo and where, its limit towards grazing, reciprocity: made when first read."""
-        return certify(self.material)
+        return replace(certify(self.material), channel_names=self.samples.channels)
 
     @property
     def model(self) -> str:

@@ -344,6 +344,11 @@ VERDICTS = {
         "channel": 1,
         "channels": 3,
     },
+    "Conserves energy: the largest albedo is 0.2, at normal incidence in channel 550 nm.": {
+        "channel": 1,
+        "channels": 2,
+        "channel_names": ("450 nm", "550 nm"),
+    },
     "Not decided: the largest albedo is 0.999 to within 0.01, at normal incidence.": {
         "max_albedo": 0.999,
         "error": 0.01,
