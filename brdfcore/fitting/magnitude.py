@@ -2,7 +2,8 @@
 
 Losses are sums of squares, the variances of values those of their products: fourth powers of residuals. So values, what
 they are over sigma, and weights must be within 1e-110 to 1e110: their squares are within 1e-220 to 1e220, which leaves
-room for the rest. A robust form's scale below 1e-10 of the data is lost in the rounding of residuals.
+room for the rest. A robust form's scale below 1e-15 of the data is lost in the rounding of residuals; the one that the
+data give is at least 1e-12 of those that it was taken from.
 """
 
 import torch
@@ -10,11 +11,11 @@ from torch import Tensor
 
 from ..errors import ParameterError, SamplesError
 from ..formats.samples import Samples
-from .data import root_weights
+from .data import root_factors, root_weights
 from .losses import LOSSES, Scales
 
 _LEAST, _MOST = 1e-110, 1e110
-_ROUNDING = 1e-10
+_ROUNDING = 1e-15
 
 
 def check_magnitudes(samples: Samples, loss: str, robust_scale: float | None) -> None:
@@ -33,12 +34,14 @@ def check_magnitudes(samples: Samples, loss: str, robust_scale: float | None) ->
     kind, c = LOSSES[loss], samples.wi[:, 2:]
     nothing = torch.zeros_like(samples.values)
     differences = kind.difference(nothing, samples.values, c, Scales.of(samples.values, c))
-    size = float((root_weights(samples, kind) * differences).abs().max()) or 1.0
+    factor = root_factors(samples, kind)  # counts a sample: the scale is that of what it counts
+    differences = root_weights(samples, kind) * differences / torch.where(factor > 0, factor, 1.0)
+    size = float(differences.square().mean().sqrt()) or 1.0
     if not _ROUNDING <= robust_scale / size <= _MOST:
         raise ParameterError(
-            f"Expected robust_scale to be from {_ROUNDING:g} to {_MOST:g} times what the largest value counts under "
-            f"the {loss} loss, {size:.3g}, got {robust_scale:g}. Choose about what good residuals are, or leave it to "
-            "the data.",
+            f"Expected robust_scale to be from {_ROUNDING:g} to {_MOST:g} times what the values count under the "
+            f"{loss} loss, their root mean square, {size:.3g}, got {robust_scale:g}. Choose about what good residuals "
+            "are, or leave it to the data.",
             field="robust_scale",
         )
 

@@ -119,7 +119,7 @@ EXTREME = {
     "robust_scale": (
         bc.Samples(WI, WO, RANDOM),
         {"robust": "cauchy", "robust_scale": 1e-300},
-        "from 1e-10 to 1e+110 times what the largest value counts under the cosine loss, 0.",
+        "from 1e-15 to 1e+110 times what the values count under the cosine loss, their root mean square, 0.",
     ),
     "large robust_scale": (bc.Samples(WI, WO, RANDOM), {"robust": "soft_l1", "robust_scale": 1e300}, "got 1e+300."),
 }

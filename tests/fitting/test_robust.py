@@ -178,6 +178,13 @@ def test_the_materials_of_a_ladder_are_compared_at_one_scale() -> None:
     assert fit.ladder[0].error == pytest.approx(math.sqrt(lambert.objective / len(samples)), rel=1e-6)
 
 
+def test_the_scale_of_an_exact_fit_may_be_given() -> None:
+    exact = measured_from(TRUE, noise=0.0)
+    scale = bc.fit(exact, TRUE, robust="cauchy").robust_scale
+    assert scale is not None
+    assert bc.fit(exact, TRUE, robust="cauchy", robust_scale=scale).robust_scale == scale
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("noise", [0.003, 0.0])
 def test_auto_sees_past_outliers(noise: float) -> None:
