@@ -5,11 +5,12 @@ import { get } from "./api.js";
 import { cosineRms, drawAlbedo, drawResiduals, THETAS } from "./curves.js";
 import { hemisphere, joined, plane } from "./directions.js";
 import { at, complain, made, shown } from "./dom.js";
+import { byHand, materialOf, valuesOf } from "./fit.js";
 import { tell } from "./hand.js";
 import { latest } from "./latest.js";
 import { drawPolar, measured, turnable } from "./polar.js";
 import { drawSolid, install as turnSolid, paint } from "./solid.js";
-import { byHand, chosen, look, materialOf, on, ranked, state, valuesOf } from "./state.js";
+import { chosen, look, on, ranked, state } from "./state.js";
 
 const SCALES = { linear: "linear", cube_root: "cube root", log: "log" };
 

@@ -1,7 +1,8 @@
 /** The page starts here. */
 
+import { onReached, Unreached } from "./api.js";
 import * as choice from "./choice.js";
-import { at, complain } from "./dom.js";
+import { at, complain, forgive } from "./dom.js";
 import * as earlier from "./earlier.js";
 import * as facts from "./facts.js";
 import { prepare } from "./figures.js";
@@ -17,6 +18,7 @@ import { on, present, state } from "./state.js";
 import * as take from "./take.js";
 import * as where from "./where.js";
 
+onReached(() => forgive((error) => error instanceof Unreached));
 key.install();
 measurement.install();
 facts.install();

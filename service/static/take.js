@@ -2,10 +2,11 @@
 
 import { ask, hasKey } from "./api.js";
 import { at, complain, made, save } from "./dom.js";
+import { nameOf } from "./fit.js";
 import { lobeOf } from "./look.js";
 import { picture } from "./solid.js";
 import { pictured } from "./sphere.js";
-import { chosen, nameOf, on, state } from "./state.js";
+import { chosen, on, state } from "./state.js";
 
 /** What a request for a fit says where nothing is asked for; the rest of it is told. @type {Record<string, unknown>} */
 const DEFAULTS = {
