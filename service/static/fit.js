@@ -14,6 +14,7 @@ export function mannerOf({ request }) {
   const losses = new Set([...state.fits.values()].map((fit) => fit.request.loss));
   const held = Object.keys(request.fixed);
   return [
+    request.model === "auto" ? "chosen by auto" : "",
     losses.size > 1 ? `${request.loss} loss` : "",
     request.starts.length > 0 ? "from values by hand" : "",
     held.length > 0 ? `${held.join(", ")} held` : "",

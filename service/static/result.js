@@ -30,7 +30,7 @@ function rank() {
   const rows = fits.map((fit, k) => [
     `${k + 1}`,
     choice(fit, k),
-    ...losses.map((loss) => figure(fit.result.errors[loss], fits.length > 1 && fit.result.errors[loss] === best[loss])),
+    ...losses.map((loss) => figure(fit.result.errors[loss], fits.length > 1 && shown(fit.result.errors[loss]) === shown(best[loss]))),
     energy(fit.result.certificate),
     `${fit.result.cost.seconds.toFixed(2)} s`,
   ]);
@@ -166,7 +166,7 @@ function interval(result, key, value, interval) {
 /** @param {any[]} rungs */
 function ladder(rungs) {
   const rows = rungs.map((rung) => [
-    rung.effect, made("span", { class: "code" }, rung.model), shown(rung.error), shown(rung.held_out), rung.kept ? "kept" : "left out", rung.reason,
+    rung.effect, rung.kept ? "kept" : "left out", made("div", { class: "why" }, rung.reason), made("span", { class: "code" }, rung.model), shown(rung.error), shown(rung.held_out),
   ]);
-  return table("The materials that were tried", ["Effect", "Model", "Error#", "Held-out error#", "", "Why"], rows);
+  return table("The materials that were tried", ["Effect", "", "Why", "Model", "Error#", "Held-out error#"], rows);
 }

@@ -71,11 +71,12 @@ function sphereOf(fit, signal) {
  * @param {import("./state.js").Fit} fit
  * @param {Record<string, number | number[]>} values
  * @param {AbortSignal} [signal]
+ * @param {number} size in pixels
  * @returns {Promise<Blob>}
  */
-export async function pictured(fit, values, signal) {
+export async function pictured(fit, values, signal, size = SIZE) {
   const { channels, material } = fit.result;
-  const json = { material: { ...material, values }, channels, channel: state.channel, size: SIZE };
+  const json = { material: { ...material, values }, channels, channel: state.channel, size };
   return (await ask("/v1/sphere", { method: "POST", json, signal })).blob();
 }
 

@@ -199,7 +199,7 @@ def test_a_measurement_of_many_channels_from_file_to_figure(page: Any, measured:
     expect(page, "#hand-said").to_contain_text("Error (cosine_rms)")
     red, green, blue = page.wait_for_function(MIDDLE).json_value()
     assert red > 20 > max(green, blue), "garnet is red"
-    playwright.expect(page.get_by_role("button", name="radiance", exact=True)).to_be_disabled()
+    playwright.expect(page.get_by_role("button", name="material for Radiance", exact=True)).to_be_disabled()
     expect(page, "#taking").to_contain_text("hold one channel, or red, green and blue; this material has 31.")
     with page.expect_download() as download:
         page.get_by_role("button", name="albedo PNG").click()
@@ -254,7 +254,7 @@ def test_a_table_without_a_header_is_asked_for_its_columns(page: Any, measured: 
         page.check(f"#ask input[value={answer}]")
         page.click("#ask button[type=submit]")
     expect(page, "#about").to_contain_text("716")
-    expect(page, "#about").to_contain_text("BRDF, without the cosine [1/sr]; degrees Change")
+    expect(page, "#about").to_contain_text("BRDF, without the cosine [1/sr]; degrees; columns")
     expect(page, "#about").to_be_focused()
     expect(page, "#ask").to_be_hidden()
     expect(page, "#measurement-error").to_be_hidden()
@@ -325,11 +325,11 @@ def test_a_choice_by_the_data_and_files_for_other_programs(page: Any) -> None:
     expect(page, "#details .verdict").to_contain_text("Conserves energy")
     expect(page, "#details").to_contain_text("How it was chosen")
     expect(page, "#taking pre >> nth=0").to_contain_text('model="auto"')
-    for name, begins in (("radiance", "# "), ("json", "{")):
+    for name, begins in (("material for Radiance", "# "), ("material as JSON", "{")):
         with page.expect_download() as download:
             page.get_by_role("button", name=name, exact=True).click()
         assert pathlib.Path(download.value.path()).read_text().startswith(begins)
-        assert download.value.suggested_filename.startswith("fit_")
+        assert download.value.suggested_filename.startswith("plate_lambert")
 
 
 def test_models_that_one_fit_compared_stand_side_by_side(page: Any) -> None:
@@ -358,7 +358,7 @@ def test_models_that_one_fit_compared_stand_side_by_side(page: Any) -> None:
     expect(page, "#taking pre >> nth=0").to_contain_text('model="lambert")')
     page.wait_for_function("(before) => document.getElementById('sphere').toDataURL() !== before", arg=best)
     with page.expect_download() as download:
-        page.get_by_role("button", name="json", exact=True).click()
+        page.get_by_role("button", name="material as JSON", exact=True).click()
     assert "ward_bounded" not in pathlib.Path(download.value.path()).read_text()
     with page.expect_download() as download:
         page.get_by_role("button", name="sphere PNG").click()
