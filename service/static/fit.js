@@ -14,12 +14,16 @@ export function mannerOf({ request }) {
   const losses = new Set([...state.fits.values()].map((fit) => fit.request.loss));
   const held = Object.keys(request.fixed);
   return [
-    request.model === "auto" ? "chosen by auto" : "",
     losses.size > 1 ? `${request.loss} loss` : "",
     request.starts.length > 0 ? "from values by hand" : "",
     held.length > 0 ? `${held.join(", ")} held` : "",
     request.conserve_energy ? "albedo kept at 1 or below" : "",
   ].filter(Boolean).join("; ");
+}
+
+/** @param {Fit} fit with a result @returns {string} how it came about, beside the model that came out; "" for plainly */
+export function originOf(fit) {
+  return [fit.request.model === "auto" ? "chosen by auto" : "", mannerOf(fit)].filter(Boolean).join("; ");
 }
 
 /** @param {Fit} fit @returns {Record<string, number | number[]>} the values of its material, those set by hand included */

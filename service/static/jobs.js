@@ -18,7 +18,7 @@ export function install() {
     const wanted = [...state.fits.keys()].map((id) => lines.get(id)?.element);
     if (wanted.some((element, k) => at("jobs").children[k] !== element) || at("jobs").childElementCount !== wanted.length)
       at("jobs").replaceChildren(...wanted);
-    for (const fit of state.fits.values()) lines.get(fit.id)?.manner(fit.request.model === "auto" ? "" : mannerOf(fit));
+    for (const fit of state.fits.values()) lines.get(fit.id)?.manner(mannerOf(fit));
     at("progress").hidden = wanted.length === 0;
     name();
   });

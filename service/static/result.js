@@ -2,7 +2,7 @@
 
 import { at, breakable, complain, made, shown, table } from "./dom.js";
 import { SERIES } from "./figures.js";
-import { mannerOf } from "./fit.js";
+import { originOf } from "./fit.js";
 import { again, submit } from "./jobs.js";
 import { nameOfDataset } from "./names.js";
 import { choose, chosen, on, ranked, state, yardstick } from "./state.js";
@@ -61,7 +61,7 @@ function minimised({ loss, chi_square }) {
 /** @param {import("./state.js").Fit} fit @param {number} rank from 0, which is the colour of its curves */
 function choice(fit, rank) {
   const radio = made("input", { type: "radio", name: "chosen-fit", checked: fit.id === state.chosen, onchange: () => choose(fit.id) });
-  return made("label", { class: "choice code" }, radio, made("span", { class: `swatch swatch-${rank % SERIES}` }), made("span", {}, breakable(fit.result.model), " ", made("span", { class: "hint" }, mannerOf(fit))));
+  return made("label", { class: "choice code" }, radio, made("span", { class: `swatch swatch-${rank % SERIES}` }), made("span", {}, breakable(fit.result.model), " ", made("span", { class: "hint" }, originOf(fit))));
 }
 
 /** @param {number | null} value @param {boolean} best */

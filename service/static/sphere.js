@@ -4,7 +4,7 @@ import { once } from "./answers.js";
 import { ask } from "./api.js";
 import { at, breakable, complain, made } from "./dom.js";
 import { SERIES } from "./figures.js";
-import { byHand, mannerOf, valuesOf } from "./fit.js";
+import { byHand, originOf, valuesOf } from "./fit.js";
 import { latest } from "./latest.js";
 import { choose, chosen, on, ranked, state } from "./state.js";
 
@@ -29,7 +29,7 @@ async function drawAll(signal) {
   for (const id of cards.keys()) if (!fits.some((fit) => fit.id === id)) cards.delete(id);
   const wanted = fits.map((fit, rank) => {
     const { item, name } = cards.get(fit.id) ?? card(fit);
-    name.replaceChildren(made("span", { class: `swatch swatch-${rank % SERIES}` }), `${rank + 1}. `, breakable(fit.result.model), " ", made("span", { class: "hint" }, mannerOf(fit)));
+    name.replaceChildren(made("span", { class: `swatch swatch-${rank % SERIES}` }), `${rank + 1}. `, breakable(fit.result.model), " ", made("span", { class: "hint" }, originOf(fit)));
     item.firstElementChild?.setAttribute("aria-pressed", String(fit.id === state.chosen));
     return item;
   });
