@@ -52,10 +52,10 @@ class UnknownNameError(BrdfError, KeyError):
     """A name that no registry holds."""
 
 
-def unknown_name(kind: str, name: str, known: Iterable[str], *, field: str | None = None) -> UnknownNameError:
+def unknown_name(kind: str, name: object, known: Iterable[str], *, field: str | None = None) -> UnknownNameError:
     """The error for a name that is not among the known ones; it names the nearest and lists all."""
     names = list(known)
-    nearest = difflib.get_close_matches(name, names, n=1)
+    nearest = difflib.get_close_matches(str(name), names, n=1)
     hint = f"Did you mean {nearest[0]!r}? " if nearest else ""
     listed = f"Known: {', '.join(names)}." if names else "There are none; leave it out."
     return UnknownNameError(f"Expected {kind} to be a known name, got {name!r}. {hint}{listed}", field=field)

@@ -28,7 +28,8 @@ def table(text: str) -> dict[str, str]:
 
 def test_models_are_the_registry() -> None:
     rows = table(section("Models"))
-    assert rows == {name: model.describe()["summary"] for name, model in bc.MODELS.items()}
+    facts = {name: model.describe() for name, model in bc.MODELS.items()}
+    assert rows == {name: f"{told['good_for']} | {told['summary']}" for name, told in facts.items()}
 
 
 def test_formats_are_the_registry() -> None:

@@ -2,10 +2,28 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from ._asking import (
+    BoundsOption,
+    ConserveOption,
+    FixedOption,
+    GrayOption,
+    MaxThetaOption,
+    OptimizerOption,
+    PerChannelOption,
+    RobustOption,
+    RobustScaleOption,
+    SeedOption,
+    StartsOption,
+    fixed_values,
+    further_starts,
+    radians,
+    ranges,
+    with_bar,
+)
 from ._reading import (
     AngleUnitOption,
     ColumnsOption,
@@ -15,7 +33,6 @@ from ._reading import (
     QuantityOption,
     RgbOption,
 )
-from .fit import _pair, _with_bar
 
 
 def command(
@@ -26,9 +43,17 @@ def command(
     ] = None,
     loss: Annotated[str, typer.Option(help="The loss that is minimised, and ranked by.")] = "cosine",
     losses: Annotated[list[str] | None, typer.Option(help="A loss to show; repeatable. By default all.")] = None,
-    fixed: Annotated[list[str] | None, typer.Option(help="KEY=VALUE to keep, as kurt.f0=0.04; repeatable.")] = None,
-    gray: Annotated[list[str] | None, typer.Option(help="A key with one value for all channels; repeatable.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the scan for starts.")] = 0,
+    optimizer: OptimizerOption = "auto",
+    fixed: FixedOption = None,
+    gray: GrayOption = None,
+    per_channel: PerChannelOption = None,
+    seed: SeedOption = 0,
+    bounds: BoundsOption = None,
+    starts: StartsOption = None,
+    robust: RobustOption = None,
+    robust_scale: RobustScaleOption = None,
+    max_theta_deg: MaxThetaOption = None,
+    conserve_energy: ConserveOption = False,
     format_: FormatOption = None,
     quantity: QuantityOption = None,
     angle_unit: AngleUnitOption = None,
@@ -47,18 +72,22 @@ def command(
     if plot is not None:  # what cannot be drawn is refused before the work, not after it
         bc.plots.kind_of(plot)
     declared = {"format": format_, "quantity": quantity, "angle_unit": angle_unit, "columns": columns}
+    asked: dict[str, Any] = {
+        "loss": loss,
+        "optimizer": optimizer,
+        "fixed": fixed_values(fixed),
+        "gray": gray or (),
+        "per_channel": per_channel or (),
+        "seed": seed,
+        "bounds": ranges(bounds),
+        "starts": further_starts(starts),
+        "robust": robust,
+        "robust_scale": robust_scale,
+        "max_theta": radians(max_theta_deg),
+        "conserve_energy": conserve_energy,
+    }
     samples = bc.read(file, **declared, material=which, rgb=rgb)
-    result = _with_bar(
-        lambda progress: bc.compare(
-            samples,
-            models or None,
-            loss=loss,
-            progress=progress,
-            fixed=dict(_pair(text) for text in fixed or []),
-            gray=gray or (),
-            seed=seed,
-        )
-    )
+    result = with_bar(lambda progress: bc.compare(samples, models or None, progress=progress, **asked))
     typer.echo(json.dumps(result.to_dict(), indent=2) if as_json else result.report(losses))
     if plot is not None:
         figure = bc.plots.comparison(result, losses, title=f"{file.name}: {len(samples)} samples")

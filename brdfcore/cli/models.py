@@ -33,14 +33,14 @@ def command(
     if not console.is_terminal:
         console.width = 120  # as wide as the models' texts
     if name is None:
-        table = Table(Column("name", no_wrap=True), "what it is", "options", "parameters", box=box.SIMPLE)
+        table = Table(Column("name", no_wrap=True), "good for", "options", "parameters", box=box.SIMPLE)
         for column in table.columns[1:]:
             column.overflow = "fold"  # no word is cut short
         for model in MODELS.values():
             facts = model.describe()
             options = ", ".join(" | ".join(group) for group in facts["options"])
             names = dict.fromkeys(p["name"] for p in facts["parameters"])
-            table.add_row(facts["name"], facts["summary"], options, ", ".join(names))
+            table.add_row(facts["name"], facts["good_for"], options, ", ".join(names))
         console.print(table)
         table = Table(Column("preset", no_wrap=True), "what it is", "source", box=box.SIMPLE)
         for preset in PRESETS.values():
@@ -54,7 +54,7 @@ def command(
         )
         return
     facts = MODELS[name].describe()
-    console.print(facts["text"], markup=False, soft_wrap=True)
+    console.print(f"{facts['text']}\n\nGood for: {facts['good_for']}", markup=False, soft_wrap=True)
     if facts["options"]:
         options = "; ".join(" | ".join(group) for group in facts["options"])
         console.print(f"\nOptions: {options}", markup=False, soft_wrap=True)

@@ -44,6 +44,7 @@ class Certificate:
     channels: int
     evaluations: int
     seconds: float
+    channel_names: tuple[str, ...] = ()  # for the sentences; a material itself has none
     allowed: float = 0.0  # by which compensated lobes may exceed 1: the error of the table that they read [1]
 
     @property
@@ -72,7 +73,8 @@ class Certificate:
     @property
     def place(self) -> str:
         """Where the largest albedo is, in words."""
-        channel = f" in channel {self.channel + 1} of {self.channels}" if self.channels > 1 else ""
+        name = self.channel_names[self.channel] if self.channel_names else f"{self.channel + 1} of {self.channels}"
+        channel = f" in channel {name}" if self.channels > 1 else ""
         if self.at_theta == 0:
             return f"at normal incidence{channel}"
         limit = self.at_theta == math.pi / 2

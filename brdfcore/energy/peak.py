@@ -39,7 +39,7 @@ def refined(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tup
 
     end = _patch(scan, len(scan.u) - 1, _first(over[-1:], tolerance, scan)[1])
     best = point(*_first(over, tolerance, scan))
-    reach = over + SPARE * _rises(over)
+    reach = over + SPARE * _rises(scan, over)
     # a limit that cannot be the largest comes last: it may take all that may be spent
     last = _limit(scan, end, tolerance) if float(reach[-1].max()) >= best.albedo - tolerance else None
     known = best.albedo if last is None else last.albedo
@@ -77,7 +77,7 @@ def _settled(scan: Scan, total: Tensor, claimed: Tensor, tolerance: float) -> tu
     """
     (over, channel), doubt = total.max(-1), claimed.amax(-1)
     for asked in (MIDDLE, tolerance / 4):
-        above, below = over + doubt + SPARE * _rises(over), over - doubt
+        above, below = over + doubt + SPARE * _rises(scan, over), over - doubt
         unsure = above > below.max()
         unsure[-1] = above[-1] > below[-1].max()
         unsure &= doubt > asked
@@ -106,16 +106,20 @@ def _patch(scan: Scan, row: int, column: int) -> Patch:
     return Patch(float(scan.u[row]), float(scan.s[column]), half_u, half_s).inside(scan)
 
 
-def _rises(over: Tensor) -> Tensor:
+def _rises(scan: Scan, over: Tensor) -> Tensor:
     """How much higher than the local tops of a scan (U, S) the parabolas through their neighbours are; 0 elsewhere."""
     tops = over == max_pool2d(over.unsqueeze(0), 3, 1, 1).squeeze(0)
     rises = torch.zeros_like(over)
-    for axis in (0, 1):
+    for axis, at in ((0, scan.u.unsqueeze(1)), (1, scan.s.unsqueeze(0))):
         if over.shape[axis] > 2:
+            step, rise = at.diff(dim=axis), over.diff(dim=axis)
             count = over.shape[axis] - 2
-            low, middle, high = (over.narrow(axis, k, count) for k in range(3))
-            bend = (2 * middle - low - high).clamp(min=1e-300)
-            rises.narrow(axis, 1, count).add_((high - low) * ((high - low) / bend) / 8)
+            (before, after), (up, down) = (
+                [part.narrow(axis, k, count) for k in (0, 1)] for part in (step, rise / step)
+            )  # steps are not even in u
+            slope = (up * after + down * before) / (before + after)
+            bend = ((up - down) / (before + after)).clamp(min=1e-300)
+            rises.narrow(axis, 1, count).add_(slope * (slope / bend) / 4)
     return torch.where(tops, rises, 0.0)
 
 

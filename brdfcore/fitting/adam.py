@@ -1,7 +1,8 @@
 """Adam (Kingma and Ba 2015) on the scaled problem: the step falls along a cosine, and each round is twice as long.
 
-A round that ends near the optimum is the last: easy problems stop after a few hundred steps, and hard ones get the
-long, slow fall that they need, so that no step size or count needs choosing.
+All starts run side by side. One that comes near its optimum ends there; the others begin the next round, scaled by the
+curvature where they are: easy problems stop after a hundred steps, and hard ones get the long, slow fall that they
+need, so that no step size or count needs choosing.
 """
 
 import math
@@ -14,7 +15,10 @@ from .levenberg_marquardt import OnStep, Outcome
 from .problem import Problem
 
 _STEP = 0.05  # of a variable of unit curvature; from a scanned start a few such steps reach the optimum
-_ROUND = 250  # steps of the first round
+_ROUND = 125  # steps of the first round
+_LOOK = 25  # steps between two looks at who has arrived, and at how far all have come
+_FIRST, _SECOND = 0.9, 0.999  # what the running means of the gradient and of its square keep, the paper's
+_LEAST = 1e-12  # added to the root of the latter
 
 
 def adam(
@@ -24,26 +28,30 @@ def adam(
     max_iterations: int = 4000,
     on_step: OnStep | None = None,
 ) -> Outcome:
-    """The point that one start x (1, D) leads to; `which` (1,) names its material."""
-    scaled = Scaled.at(problem, x[0], which)
-    z = torch.nn.Parameter(scaled.z(scaled.x(torch.zeros_like(x[0]))))
+    """The point that each start x (S, D) leads to; `which` (S,) names its material."""
+    x = x.clamp(problem.low, problem.high).clone()
+    arrived = torch.zeros(len(x), dtype=torch.bool)
     done, steps = 0, _ROUND
-    while done < max_iterations:
+    while done < max_iterations and not bool(arrived.all()):
+        going = (~arrived).nonzero()[:, 0]
+        scaled = Scaled.at(problem, x[going], None if which is None else which[going])
         steps = min(steps, max_iterations - done)
-        optimizer = torch.optim.Adam([z], lr=_STEP)
-        for step in range(steps):
-            optimizer.param_groups[0]["lr"] = 0.5 * _STEP * (1 + math.cos(math.pi * step / steps))
-            loss, z.grad = scaled.loss_and_gradient(z)
-            optimizer.step()
-            with torch.no_grad():
-                z.copy_(scaled.z(scaled.x(z)))
-            if on_step is not None and step % 50 == 0:
-                on_step(done + step, loss * scaled.unit)
-        done += steps
-        if scaled.near(z):
-            break
-        scaled = Scaled.at(problem, scaled.x(z.detach()), which)  # the curvature here, not at the start
-        with torch.no_grad():
-            z.zero_()
+        z = torch.zeros_like(scaled.x0)
+        first, second = torch.zeros_like(z), torch.zeros_like(z)
+        for step in range(1, steps + 1):
+            loss, gradient = scaled.descent(z)
+            if step % _LOOK == 1:
+                if on_step is not None:
+                    on_step(done, float((loss * scaled.unit).min()))
+                if bool(scaled.near(z).all()):
+                    break
+            first = _FIRST * first + (1 - _FIRST) * gradient
+            second = _SECOND * second + (1 - _SECOND) * gradient.square()
+            mean, square = first / (1 - _FIRST**step), second / (1 - _SECOND**step)
+            rate = 0.5 * _STEP * (1 + math.cos(math.pi * (step - 1) / steps))
+            z = scaled.inside(z - rate * mean / (square.sqrt() + _LEAST))
+            done += 1
+        x[going] = scaled.x(z)
+        arrived[going] = scaled.near(z)
         steps *= 2
-    return scaled.outcome(z, done)
+    return Outcome(x, problem.loss(x, which), arrived, done)

@@ -8,6 +8,7 @@ from ..models.form import Form, build
 from ..models.text import parse
 from . import plan
 from .effects import AUTO, RICHEST
+from .given import plainly
 from .plan import Plan
 
 _BY_KEY = ("fixed", "bounds", "gray", "per_channel")  # keywords that name a material's values
@@ -15,7 +16,7 @@ _BY_KEY = ("fixed", "bounds", "gray", "per_channel")  # keywords that name a mat
 
 def texts(model: object) -> tuple[str, ...]:
     """The texts that a model may be, for "auto" those with every effect; raises for a list that is not of texts."""
-    if model == AUTO:
+    if isinstance(model, str) and model == AUTO:
         return tuple(effects.text() for effects in RICHEST)
     if isinstance(model, str):
         return (model,)
@@ -29,24 +30,31 @@ def texts(model: object) -> tuple[str, ...]:
 
 
 def own(keywords: Mapping[str, Any], form: Form) -> dict[str, Any]:
-    """The keywords of `fit`, those that name values without the values that the form does not have."""
+    """The keywords of `fit`, made plain (given.py), those that name values without what the form does not have."""
     found = dict(keywords)
     for name in _BY_KEY:
         given = keywords.get(name)
         if isinstance(given, Mapping):
             found[name] = {key: value for key, value in given.items() if key in form.parameters}
-        elif given is not None and not isinstance(given, str):
+        elif given is not None:
             found[name] = [key for key in given if key in form.parameters]
     starts = keywords.get("starts") or ()
-    found["starts"] = [
-        {k: v for k, v in one.items() if k in form.parameters} if isinstance(one, Mapping) else one for one in starts
-    ]
+    found["starts"] = [{k: v for k, v in one.items() if k in form.parameters} for one in starts]
     return found
+
+
+def fell_away(keywords: Mapping[str, Any], form: Form) -> tuple[str, ...]:
+    """A sentence for each keyword that names values which the chosen form does not have."""
+    return tuple(
+        f"{name} names {', '.join(keys)}, which the material chosen does not have, so that had no effect on it."
+        for name in _BY_KEY
+        if (keys := [key for key in keywords.get(name) or () if key not in form.parameters])
+    )
 
 
 def check(channels: int, model: str | Sequence[str], *, azimuth_observed: bool = False, **keywords: Any) -> Plan:
     """The plan of these arguments of `fit` for data of so many channels, of several models the last; raises as it."""
-    several = texts(model)
+    several, keywords = texts(model), plainly(keywords)
     if len(several) == 1:
         return plan.check(channels, several[0], azimuth_observed=azimuth_observed, **keywords)
     known: set[str] = set()
@@ -60,7 +68,7 @@ def check(channels: int, model: str | Sequence[str], *, azimuth_observed: bool =
     for name, keys in named.items():
         for key in keys:
             if key not in known:
-                raise unknown_name(f"a key of {name}", str(key), sorted(known), field=name)
+                raise unknown_name(f"a key of {name}", key, sorted(known), field=name)
     return made[-1]
 
 

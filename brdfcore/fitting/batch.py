@@ -10,6 +10,7 @@ from ..errors import SamplesError
 from ..formats.samples import Samples
 from ._fit import Teller, planned
 from .conservation import conserving
+from .given import plainly
 from .result import Fit
 from .search import search
 from .worth import fits
@@ -24,8 +25,9 @@ def fit_batch(several: Iterable[Samples], model: str, **keywords: Any) -> list[F
     row beside the others. The rest are fitted one directions' set after the other. Each fit equals that of `fit` alone
     to rounding; its cost is its share of the batch's. Everything that can be refused is refused before any work.
     """
-    every = list(several)
+    every = _listed(several)
     progress = keywords.pop("progress", None)
+    keywords = plainly(keywords)
     sets: dict[object, list[int]] = {}
     for i, samples in enumerate(every):
         sets.setdefault(_alike(samples), []).append(i)
@@ -58,6 +60,17 @@ def fit_batch(several: Iterable[Samples], model: str, **keywords: Any) -> list[F
     return [found[i] for i in range(len(every))]
 
 
+def _listed(several: object) -> list[Samples]:
+    """The samples one by one; raises where there is no list of them."""
+    if isinstance(several, Samples) or not isinstance(several, Iterable):
+        raise SamplesError(
+            f"Expected samples to be a list of Samples, got {type(several).__name__}. Pass a list, or use bc.fit for "
+            "one material.",
+            field="samples",
+        )
+    return list(several)
+
+
 def _alike(samples: Samples) -> object:
     """What samples that can be fitted in one batch have in common."""
     if not isinstance(samples, Samples):
@@ -67,4 +80,6 @@ def _alike(samples: Samples) -> object:
             field="samples",
         )
     directions = tuple(hash(each.numpy().tobytes()) for each in (samples.wi, samples.wo))
-    return *directions, samples.values.shape, samples.azimuth_observed, samples.sigma is None
+    known = samples.sigma is not None
+    weighs = known and samples.weight is None  # sigma does, where no weight takes its place
+    return *directions, samples.values.shape, samples.channels, samples.azimuth_observed, known, weighs

@@ -4,7 +4,7 @@ As Table 3 and Figures 6 and 8 of Kurt et al. 2010, which compare the models' L2
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,8 +14,11 @@ from ..models import MODELS
 from ..models._diffuse import CosineSampled
 from ._fit import Progress, Teller, check_samples, fit
 from .asked import check, form_of, own
+from .effects import AUTO
+from .given import plainly
 from .losses import LOSSES
 from .result import Fit
+from .shared_scale import with_shared_scale
 
 LOBES = tuple(name for name, model in MODELS.items() if not issubclass(model, CosineSampled))
 
@@ -90,7 +93,7 @@ class Comparison:
 
 def compare(
     samples: Samples,
-    models: Sequence[str] | None = None,
+    models: Iterable[str] | None = None,
     loss: str = "cosine",
     progress: Callable[[Progress], None] | None = None,
     **keywords: Any,
@@ -103,17 +106,12 @@ def compare(
     Raises what `fit` raises, before any work, and ModelTextError where there is no model.
     """
     check_samples(samples)
-    texts = [f"lambert + {name}" for name in LOBES] if models is None else models
-    if isinstance(texts, str) or not list(texts):
-        raise ModelTextError(
-            f"Expected models to be a list of texts, got {texts!r}. Write it like ['lambert + ward', 'kurt'].",
-            field="models",
-        )
-    texts = list(dict.fromkeys(texts))
+    texts = [f"lambert + {name}" for name in LOBES] if models is None else _texts(models)
     observed = samples.azimuth_observed
-    keywords = {**keywords, "loss": loss}
+    keywords = plainly({**keywords, "loss": loss})
     check(samples.values.shape[1], texts, azimuth_observed=observed, **keywords)
     begun = time.perf_counter()
+    keywords = with_shared_scale(samples, texts, keywords)
     found = []
     for i, text in enumerate(texts):
         concerned = own(keywords, form_of(text, azimuth_observed=observed))
@@ -121,6 +119,24 @@ def compare(
     order = sorted(range(len(texts)), key=lambda i: found[i].objective)
     seconds = time.perf_counter() - begun
     return Comparison(tuple(found[i] for i in order), tuple(texts[i] for i in order), loss, seconds)
+
+
+def _texts(models: object) -> list[str]:
+    """The texts, each once; raises where they are no list of texts of one material each."""
+    found = list(models) if isinstance(models, Iterable) and not isinstance(models, str) else []
+    if not found or not all(isinstance(text, str) for text in found):
+        raise ModelTextError(
+            f"Expected models to be a list of texts, got {found or models!r}. Write it like "
+            "['lambert + ward', 'kurt'].",
+            field="models",
+        )
+    if AUTO in found:
+        raise ModelTextError(
+            f'Expected models to name a material each, got "{AUTO}" among them, which chooses among several. '
+            "Use bc.fit for that.",
+            field="models",
+        )
+    return list(dict.fromkeys(found))
 
 
 def free_values(one: Fit) -> int:

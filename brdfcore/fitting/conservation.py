@@ -33,7 +33,7 @@ from .levenberg_marquardt import Outcome
 from .plan import Plan
 from .problem import Problem
 from .result import Conservation, Fit
-from .search import Found, Say, search
+from .search import Found, Say, joined, search
 from .solve import solve_box
 from .worth import fits
 
@@ -58,7 +58,7 @@ def conserving(free: Fit, found: Found, kept: Samples, whole: Samples, optimizer
     certificate, directions = free.certificate, torch.zeros(0, 2, dtype=torch.float64)
     while math.isinf(certificate.max_albedo) and (plan := _limited(found)) is not None:
         fixed = (*fixed, *(plan.fixed - found.problem.plan.fixed))
-        found = _joined(found, search(plan, [kept], loss, optimizer, seed, say))
+        found = joined(found, search(_at_scale(found, plan), [kept], loss, optimizer, seed, say))
         certificate = _certificate(found)
     for done in range(ROUNDS):
         hopeless = len(directions) > 0 and not bool(found.outcome.converged[0])
@@ -110,13 +110,6 @@ def _certificate(found: Found) -> Certificate:
     return certify(Material(problem.plan.form, problem.unpack(found.outcome.x[0])), tolerance=MARGIN)
 
 
-def _joined(before: Found, after: Found) -> Found:
-    """What came after, its cost with that of what came before."""
-    return replace(
-        after, evaluations=before.evaluations + after.evaluations, iterations=before.iterations + after.iterations
-    )
-
-
 def _limited(found: Found) -> Plan | None:
     """The plan with one more value fixed, where a term's albedo has a limit; None where no free value gives it one."""
     problem = found.problem
@@ -135,6 +128,12 @@ def _limited(found: Found) -> Plan | None:
         if scale in own and keys[scale] in plan.free and bool((plan.limits(keys[scale])[0] <= 0).all()):
             return _with_fixed(plan, keys[scale], torch.zeros(()))
     return None
+
+
+def _at_scale(found: Found, plan: Plan) -> Plan:
+    """The plan at the robust scale that what was found has: only then do the objectives compare."""
+    scale = found.problem.robust_scale
+    return plan if scale is None else replace(plan, robust_scale=float(scale[0]))
 
 
 def _with_fixed(plan: Plan, key: str, value: Tensor) -> Plan:

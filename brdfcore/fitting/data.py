@@ -23,6 +23,7 @@ class Data:
     c: Tensor  # (N,) cos theta_i
     y: Tensor  # (M, C, N)
     root_weight: Tensor  # (M, C, N), (1, 1, N) or between, square roots of the weights
+    root_factor: Tensor  # (M, 1, N) or (1, 1, N), of those what counts a sample: 1 where sigma made them
     sigma: Tensor | None  # (M, C, N)
     scales: Scales
 
@@ -37,9 +38,15 @@ class Data:
             c,
             y,
             stacked_weights(samples, loss).sqrt() if not sigmas else _alike([root_weights(s, loss) for s in samples]),
+            stacked_weights(samples, loss).sqrt() if not sigmas else _alike([root_factors(s, loss) for s in samples]),
             torch.stack(sigmas) if len(sigmas) == len(samples) else None,
             scales or Scales.stacked(y, c),
         )
+
+    @property
+    def counted(self) -> Tensor:
+        """What makes a weighted residual of one: the root of its weight as a factor, 1 where that is 0."""
+        return torch.where(self.root_factor > 0, self.root_factor, 1.0)
 
     def slice(self, begin: int, end: int) -> "Data":
         """The samples from begin to end."""
@@ -48,6 +55,7 @@ class Data:
             self.c[begin:end],
             self.y[..., begin:end],
             self.root_weight[..., begin:end],
+            self.root_factor[..., begin:end],
             None if self.sigma is None else self.sigma[..., begin:end],
             self.scales,
         )
@@ -61,6 +69,7 @@ class Data:
             self.c,
             self.y.index_select(0, which),
             self.root_weight if len(self.root_weight) == 1 else self.root_weight.index_select(0, which),
+            self.root_factor if len(self.root_factor) == 1 else self.root_factor.index_select(0, which),
             None if self.sigma is None else self.sigma.index_select(0, which),
             self.scales.rows(which),
         )
@@ -115,6 +124,17 @@ def root_weights(samples: Samples, loss: Loss) -> Tensor:
 
     With a known sigma and no weight, a statistical loss weighs by the inverse variance of c y: that is chi-square.
     """
-    if loss.statistical and samples.sigma is not None and samples.weight is None:
+    if samples.sigma is not None and is_weighed(samples, loss):
         return 1 / (samples.wi[:, 2:] * samples.sigma)
     return weights(samples, loss).sqrt()
+
+
+def root_factors(samples: Samples, loss: Loss) -> Tensor:
+    """What of those counts a sample and does not measure its residual by its noise, (N, 1): 1 where sigma weighs."""
+    own = weights(samples, loss).sqrt()
+    return torch.ones_like(own) if is_weighed(samples, loss) else own
+
+
+def is_weighed(samples: Samples, loss: Loss) -> bool:
+    """Whether the samples' sigma weighs the loss."""
+    return loss.statistical and samples.sigma is not None and samples.weight is None

@@ -78,4 +78,8 @@ class Effects:
         return None if leaner == self else leaner
 
 
-RICHEST = tuple(Effects(lobes=2, fresnel=True, anisotropic=turned) for turned in (False, True))
+RICHEST = tuple(
+    Effects(lobes=2, fresnel=family not in _WITHOUT_FRESNEL, anisotropic=turned, family=family)
+    for family in reversed(FAMILIES)
+    for turned in (False, True)
+)

@@ -3,10 +3,13 @@
     error = sqrt(sum w r_i^2 / sum w)      r_i, the loss's difference at sample i, of the fit that never saw i's block
 
 Each fold is fitted to the samples of the others, from the optimum of all, all folds as one batch; so it costs a few
-steps beside the fit itself, and finds the optimum next to that of all the data.
+steps beside the fit itself, and finds the optimum next to that of all the data. Under `conserve_energy` each fold is a
+fit of its own.
 """
 
+import math
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +18,13 @@ from torch import Tensor
 
 from ..errors import ParameterError
 from ..formats.samples import Samples, angles
-from ._fit import planned
+from ._fit import Progress, Teller, fit, planned
 from .data import Data
 from .folds import split
+from .given import plainly, whole
 from .least_squares import least_squares
 from .problem import Problem
+from .result import number
 from .search import search
 
 _STEPS = 40  # of a fold; it begins next to its optimum
@@ -28,7 +33,10 @@ _ENOUGH = 1e-9  # of a fold's loss: what another step would gain
 
 @dataclass(frozen=True)
 class Incidence:
-    """A block of samples that were left out together: its mean theta_i [rad], fold, samples and error."""
+    """A block of samples that were left out together: its mean theta_i [rad], fold, samples and error.
+
+    The error is NaN where no sample of the block has weight.
+    """
 
     theta: float
     fold: int
@@ -40,6 +48,7 @@ class Incidence:
 class HeldOut:
     """Errors at samples that were left out, root mean squares in the unit of the loss's residual, by fold and by block.
 
+    NaN stands for a fold or block in which no sample has weight.
     `fitted` is the same error of the fit to all samples, at the samples it was fitted to.
     """
 
@@ -51,12 +60,31 @@ class HeldOut:
     seconds: float  # without the fit to all samples
 
     def to_dict(self) -> dict[str, Any]:
-        """The errors as JSON-able data."""
-        return {**vars(self), "folds": list(self.folds), "incidences": [vars(one).copy() for one in self.incidences]}
+        """The errors as JSON-able data, null where there is no number."""
+        blocks = [{**vars(one), "error": number(one.error)} for one in self.incidences]
+        whole = {"error": number(self.error), "fitted": number(self.fitted)}
+        return {**vars(self), **whole, "folds": [number(one) for one in self.folds], "incidences": blocks}
+
+    def __str__(self) -> str:
+        """The errors as plain text, a line for each incidence that was left out, the steepest last."""
+        lines = [
+            f"held out: error {self.error:.5g}, and {self.fitted:.5g} where fitted: root mean squares of the "
+            f"{self.loss} loss's residual, {len(self.folds)} folds in {self.seconds:.2f} s",
+            f"{'incidence [deg]':<20}{'fold':>8}{'samples':>10}{'error':>12}",
+        ]
+        blocks = sorted(self.incidences, key=lambda one: (one.theta, one.fold))
+        lines += [f"{math.degrees(b.theta):<20.4g}{b.fold:>8}{b.samples:>10}{b.error:>12.5g}" for b in blocks]
+        return "\n".join(lines)
 
 
 def held_out(
-    samples: Samples, model: str, loss: str = "cosine", folds: int = 5, seed: int = 0, **keywords: Any
+    samples: Samples,
+    model: str,
+    loss: str = "cosine",
+    folds: int = 5,
+    seed: int = 0,
+    progress: Callable[[Progress], None] | None = None,
+    **keywords: Any,
 ) -> HeldOut:
     """The model's error under the loss at incidences that were left out; the keywords are those of `fit`.
 
@@ -65,13 +93,22 @@ def held_out(
 
     Raises what `fit` raises, and ParameterError where there are not enough samples.
     """
-    plan, (kept,) = planned([samples], model, loss=loss, seed=seed, **keywords)
-    check_folds(folds, len(kept))
-    found = search(plan, [kept], loss, keywords.get("optimizer", "auto"), seed, lambda stage, fraction, value: None)
+    keywords = plainly({**keywords, "loss": loss, "seed": seed})
+    plan, (kept,) = planned([samples], model, **keywords)
+    parts, seed, say = checked_folds(folds, len(kept)), keywords["seed"], Teller(progress)
+    found = search(plan, [kept], loss, keywords.get("optimizer", "auto"), seed, say)
+    problem, x = found.problem, found.outcome.x
+    if plan.conserve_energy:
+        x = _conserving(problem, kept, model, keywords)
     begun = time.perf_counter()
-    block, fold = split(kept, folds, seed)
-    squares, weights = left_out(found.problem, found.outcome.x, fold)
-    own = _squares(found.problem, found.outcome.x, torch.zeros_like(fold))
+    block, fold = split(kept, parts, seed)
+    if plan.conserve_energy:
+        rows = [_conserving(problem, kept.subset(fold != k), model, keywords) for k in range(int(fold.max()) + 1)]
+        squares, weights = _squares(problem, torch.cat(rows), fold), _weights(problem)
+    else:
+        squares, weights = left_out(problem, x, fold)
+    own = _squares(problem, x, torch.zeros_like(fold))
+    say("done", 1.0, float(found.outcome.loss[0]))
     theta = _mean(angles(kept.wi)[0], torch.ones_like(weights), block)
     sizes = block.bincount().tolist()
     error = _mean(squares, weights, block).sqrt().tolist()
@@ -86,14 +123,22 @@ def held_out(
     )
 
 
-def check_folds(folds: object, count: int) -> None:
-    """Raise where this is no number of folds, or there are fewer samples than folds."""
-    if isinstance(folds, bool) or not isinstance(folds, int) or folds < 2:
+def _conserving(problem: Problem, samples: Samples, model: str, keywords: Mapping[str, Any]) -> Tensor:
+    """The raw values (1, D) of the fit to these samples that conserves energy, under the problem's own robust scale."""
+    scale = problem.robust_scale
+    own = {**keywords, "robust_scale": None if scale is None else float(scale[0])}
+    return problem.pack(fit(samples, model, **own).values).unsqueeze(0)
+
+
+def checked_folds(folds: object, count: int) -> int:
+    """The number of folds; raises where this is none, or there are fewer samples than folds."""
+    if (number := whole(folds)) is None or number < 2:
         raise ParameterError(f"Expected folds to be a whole number from 2 on, got {folds!r}. Use 5.", field="folds")
-    if count < folds:
+    if count < number:
         raise ParameterError(
-            f"Expected folds to be at most the number of samples, got {folds} for {count}. Lower it.", field="folds"
+            f"Expected folds to be at most the number of samples, got {number} for {count}. Lower it.", field="folds"
         )
+    return number
 
 
 def left_out(problem: Problem, x: Tensor, fold: Tensor) -> tuple[Tensor, Tensor]:
@@ -109,6 +154,7 @@ def left_out(problem: Problem, x: Tensor, fold: Tensor) -> tuple[Tensor, Tensor]
         data.c,
         data.y.expand(folds, -1, -1),
         data.root_weight * seen,
+        data.root_factor,
         None if data.sigma is None else data.sigma.expand(folds, -1, -1),
         data.scales.rows(torch.zeros_like(which)),
     )
@@ -117,18 +163,24 @@ def left_out(problem: Problem, x: Tensor, fold: Tensor) -> tuple[Tensor, Tensor]
     rows = x.expand(folds, -1)
     if problem.size:
         rows = least_squares(trained, rows.clone(), which, _ENOUGH, _STEPS).x
-    weights = data.root_weight.square().expand_as(data.y).sum((0, 1))
-    return _squares(problem, rows, fold), weights
+    return _squares(problem, rows, fold), _weights(problem)
+
+
+def _weights(problem: Problem) -> Tensor:
+    """The weights (N,) of each sample's residuals, over the channels."""
+    return problem.data.root_weight.square().expand_as(problem.data.y).sum((0, 1))
 
 
 def typical(squares: Tensor, weights: Tensor, block: Tensor, least: float) -> float:
     """The geometric mean over the samples of their blocks' errors, each at least `least`, in the residual's unit.
 
-    It falls where the errors of most samples' blocks do. The root mean square is that of one block where none of the
-    others is like it, as the steepest incidence of a paint, which models then miss by as much as chance has it.
+    Samples of weight 0 do not count. It falls where the errors of most samples' blocks do. The root mean square is that
+    of one block where none of the others is like it, as the steepest incidence of a paint, which models then miss by as
+    much as chance has it.
     """
     errors = _mean(squares, weights, block).sqrt().clamp(min=least)
-    return float((block.bincount() / len(block) * errors.log()).sum().exp())
+    counts = block.bincount((weights > 0).to(weights))
+    return float((counts / counts.sum() * errors.log())[counts > 0].sum().exp())
 
 
 def _squares(problem: Problem, x: Tensor, row: Tensor) -> Tensor:
@@ -143,7 +195,7 @@ def _squares(problem: Problem, x: Tensor, row: Tensor) -> Tensor:
 
 
 def _mean(values: Tensor, weights: Tensor, label: Tensor) -> Tensor:
-    """The sums of the values over those of the weights, a label (L,)."""
+    """The sums of the values over those of the weights, a label (L,); NaN for a label without weight."""
     sums = torch.zeros(2, int(label.max()) + 1, dtype=torch.float64)
     sums.index_add_(1, label, torch.stack([values, weights]))
-    return sums[0] / sums[1].clamp(min=1e-300)
+    return sums[0] / sums[1]

@@ -4,9 +4,10 @@
 
 The singular values s are pure numbers; a direction whose s is 0 to rounding changes no residual. Noise hides others: a
 direction counts as not determined where, along its 95 % interval, some value would cross all of the range in which it
-is searched, a factor of 300 for a width, [0, 1] for a reflectance or alpha. A value takes part in such a direction if,
-over that length, it changes by half of itself or more (a width by exp(1/2)) and by more than the length of its interval
-would be if the others were known. Directions are combined until each has as few such values as possible.
+is searched, a factor of 300 for a width, [0, 1] for a reflectance or alpha, or the user's bounds where those are
+narrower. A value takes part in such a direction if, over that length, it changes by half of itself or more (a width by
+exp(1/2)) and by more than the length of its interval would be if the others were known. Directions are combined until
+each has as few such values as possible.
 """
 
 from collections.abc import Sequence
@@ -91,11 +92,11 @@ class Unseen(NamedTuple):
 
 
 def ranges(problem: Problem) -> Tensor:
-    """The length of the range in which each raw value is searched, (D,)."""
+    """The length of the range in which each raw value is searched, within the user's bounds, (D,)."""
     found = torch.ones(problem.size, dtype=torch.float64)
     for key, at in problem.slices.items():
         parameter = problem.plan.form.parameters[key]
-        low, high = parameter.to_raw(torch.tensor(parameter.search_range, dtype=torch.float64))
+        low, high = parameter.to_raw(torch.tensor(problem.plan.search_range(key), dtype=torch.float64))
         found[at] = high - low
     return found
 

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from ..errors import ParameterError, unknown_name
 from ..models.form import Form
+from .given import check_known
 from .robust import ROBUST
 
 
@@ -16,19 +17,14 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def checked_bounds(form: Form, bounds: object, start: Mapping[str, Tensor], given: Iterable[str]) -> dict[str, Any]:
-    """The bounds as pairs of floats; raises where they are none, leave a parameter's box, or exclude a given value."""
-    if bounds is None:
-        return {}
-    if not isinstance(bounds, Mapping):
-        raise ParameterError(
-            f"Expected bounds to be a mapping of keys to (low, high), got {type(bounds).__name__}. Pass a dict.",
-            field="bounds",
-        )
+def checked_bounds(
+    form: Form, bounds: Mapping[str, object] | None, start: Mapping[str, Tensor], given: Iterable[str]
+) -> dict[str, Any]:
+    """The bounds as pairs of floats; raises for one that is none, leaves its box, or excludes a given value."""
     found = {}
-    for key, pair in bounds.items():
+    for key, pair in (bounds or {}).items():
         if key not in form.parameters:
-            raise unknown_name("a key of bounds", str(key), form.parameters, field="bounds")
+            raise unknown_name("a key of bounds", key, form.parameters, field="bounds")
         if not isinstance(pair, list | tuple) or len(pair) != 2 or not all(map(_is_number, pair)) or pair[0] >= pair[1]:
             raise ParameterError(
                 f"Expected the bounds of {key} to be two numbers, the lower one first, got {pair!r}. "
@@ -62,8 +58,8 @@ def checked_bounds(form: Form, bounds: object, start: Mapping[str, Tensor], give
 
 def check_robust(robust: object, scale: object) -> None:
     """Raise where these are no robust form and no scale of one."""
-    if robust is not None and robust not in ROBUST:
-        raise unknown_name("a robust form", str(robust), ROBUST, field="robust")
+    if robust is not None:
+        check_known("a robust form", robust, ROBUST, "robust")
     if scale is None:
         return
     if robust is None:
@@ -80,8 +76,14 @@ def check_robust(robust: object, scale: object) -> None:
 
 
 def check_max_theta(angle: object) -> None:
+    """Raise where this is neither None nor a polar angle in radians."""
+    if angle is not None:
+        check_angle(angle)
+
+
+def check_angle(angle: object) -> None:
     """Raise where this is no polar angle in radians."""
-    if angle is None or (isinstance(angle, int | float) and _is_number(angle) and 0 < angle <= math.pi / 2):
+    if isinstance(angle, int | float) and _is_number(angle) and 0 < angle <= math.pi / 2:
         return
     raise ParameterError(
         f"Expected max_theta to be an angle in (0, pi/2] radians, got {angle!r}. For 80 degrees pass math.radians(80).",

@@ -7,7 +7,8 @@ fit to old and new samples will have, under its loss, whether or not that weighs
 v; else the residuals do, as noise that is even and noise that grows with the value (signal_noise.py), and both are
 carried to the new directions. Values are taken one by one, then exchanged one by one as long as that gains. A value
 that the data leave free is known to lie in its box and no better, so that the first directions are those that
-determine it.
+determine it. Under a loss that does not weigh as the noise would, a noisy sample can make some value less sure than it
+was, however much it tells of others: directions that would are passed over, as long as there are others.
 
 What is proposed lies on a grid that a goniometer reaches: polar angles to `max_theta`, in the plane of incidence, and
 out of it where the data are; the sample is turned where the data's was. Values on an end of their box count as if
@@ -16,8 +17,7 @@ Source: Fedorov 1972, exchange of design points; White 1980 for A^-1 B A^-1.
 """
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -28,17 +28,20 @@ from ..formats.samples import Samples, angles
 from ..geometry import from_angles
 from .criterion import spread
 from .data import Data
-from .limits import check_max_theta
+from .given import plain, whole
+from .limits import check_angle
 from .losses import LOSSES
-from .plan import Plan
 from .problem import Problem
 from .result import Fit
+from .robust import ROBUST
 from .signal_noise import noise
 
 _STEP = 5.0  # degrees between polar angles
 _NEAR = (-8.0, -6.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)  # degrees from the mirror direction
 _TURN = 30.0  # degrees between azimuths
 _ROUNDS = 4  # of exchanges; one or two find all there is
+_TRIED = 512  # of the best candidates, among which one that makes no value less sure is looked for
+_AT_ONCE = 64  # of those
 _WORK = 2e8  # candidates times the cube of the values: the grid is thinned beyond
 
 
@@ -74,6 +77,16 @@ class NextDirections:
             "information": self.information,
         }
 
+    def __str__(self) -> str:
+        """The directions and the shrinkage as plain text, angles in degrees, a line each."""
+        rows = torch.rad2deg(torch.stack(list(self.angles.values()), -1)).tolist()
+        lines = [f"{'measure next [deg]':<20}" + "".join(f"{name:>10}" for name in self.angles)]
+        lines += [f"{number:<20}" + "".join(f"{angle:>10.4g}" for angle in row) for number, row in enumerate(rows, 1)]
+        lines.append("intervals then, as shares of those now:")
+        for key, value in self.shrinkage.items():
+            lines.append(f"{key:<32}" + ", ".join(f"{share:.3g}" for share in value.reshape(-1).tolist()))
+        return "\n".join(lines)
+
 
 def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -> NextDirections:
     """So many directions, no two alike, whose samples would make the fit's values surest.
@@ -82,11 +95,15 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
 
     Raises ParameterError for a count below 1, an angle out of range, or a fit without a free value.
     """
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        raise ParameterError(f"Expected count to be a whole number from 1 on, got {count!r}. Use 10.", field="count")
-    check_max_theta(max_theta)
-    plan = Plan(fit.form, fit.values, frozenset(fit.fixed), frozenset(fit.gray), frozenset(fit.per_channel), ())
-    problem = Problem(plan, fit.samples, LOSSES[fit.loss])
+    if not isinstance(fit, Fit):
+        raise ParameterError(
+            f"Expected fit to be a Fit, got {type(fit).__name__}. Pass what bc.fit returned.", field="fit"
+        )
+    wanted, max_theta = check_count(count), plain(max_theta)
+    check_angle(max_theta)
+    plan = replace(fit.plan, start=fit.values, starts=())
+    scale = None if fit.robust_scale is None else torch.tensor([fit.robust_scale], dtype=torch.float64)
+    problem = Problem(plan, fit.samples, LOSSES[fit.loss], robust_scale=scale)
     x = problem.pack(fit.values).unsqueeze(0)
     if not problem.size:
         raise ParameterError(
@@ -97,14 +114,21 @@ def next_directions(fit: Fit, count: int, max_theta: float = math.radians(85)) -
     thin = max(1, math.ceil(len(wi) * problem.size**3 / _WORK))
     wi, wo = wi[::thin], wo[::thin]
     columns, variance = design.candidates(wi, wo)
-    chosen = _exchanged(design, columns, variance, min(count, len(wi)))
+    chosen = _exchanged(design, columns, variance, min(wanted, len(wi)))
     before = design.covariance(design.a, design.b)
-    a, b = design.with_(columns[chosen], variance[chosen])
-    after = design.covariance(a.sum(0) + design.a, b.sum(0) + design.b)
+    after = design.covariance(*design.joined(columns[chosen], variance[chosen]))
     ratio = (after.diagonal() / before.diagonal()).sqrt()
     shrinkage = {key: ratio[at].reshape(plan.start[key].shape) for key, at in problem.slices.items()}
     information = float(torch.logdet(before) - torch.logdet(after))
     return NextDirections(wi[chosen], wo[chosen], shrinkage, information)
+
+
+def check_count(count: object) -> int:
+    """The number of directions; raises ParameterError where this is none."""
+    wanted = whole(count)
+    if wanted is None or wanted < 1:
+        raise ParameterError(f"Expected count to be a whole number from 1 on, got {count!r}. Use 10.", field="count")
+    return wanted
 
 
 def reachable(samples: Samples, max_theta: float) -> tuple[Tensor, Tensor]:
@@ -146,7 +170,7 @@ class _Design:
             for piece in data.chunks(problem.channels):  # as the leverages stand
                 own = f[..., at : at + len(piece.c)]
                 counted = (piece.root_weight > 0).expand_as(own)
-                squares.append((own - piece.y)[counted].square())
+                squares.append(_counted(problem, own, piece)[counted].square())
                 values.append(own[counted])
                 at += len(piece.c)
             self.noise = noise(torch.cat(squares) / left, torch.cat(values))
@@ -188,6 +212,11 @@ class _Design:
         b = self.problem.scatter_matrix(each * variance[..., None, None])
         return a, b
 
+    def joined(self, columns: Tensor, variance: Tensor) -> tuple[Tensor, Tensor]:
+        """A and B of the samples so far and of some candidates together, (D, D)."""
+        a, b = self.with_(columns, variance)
+        return self.a + a.sum(0), self.b + b.sum(0)
+
     def covariance(self, a: Tensor, b: Tensor) -> Tensor:
         """A^-1 B A^-1."""
         inverse = torch.linalg.inv(a)
@@ -204,19 +233,37 @@ class _Design:
         return torch.cat(found)
 
 
+def _counted(problem: Problem, f: Tensor, data: Data) -> Tensor:
+    """What is left of the values beside f (1, C, N), as much as a robust form counts of it."""
+    left = f - data.y
+    if problem.plan.robust is None or problem.robust_scale is None:
+        return left
+    plain = Problem(replace(problem.plan, robust=None), [], problem.loss_kind, data=data)
+    z = (plain.residuals(f, data, None)[1] / (problem.robust_scale * data.counted)).square()
+    return left * ROBUST[problem.plan.robust].functions(z)[1]
+
+
 def _exchanged(design: _Design, columns: Tensor, variance: Tensor, count: int) -> list[int]:
     """The candidates that make the values surest: one by one, then each exchanged for a better one if there is one."""
     chosen: list[int] = []
+    before = design.covariance(design.a, design.b).diagonal().clamp(min=1e-300)
 
-    def best(without: Iterable[int]) -> tuple[int, float]:
-        rest = list(without)
-        a, b = design.a, design.b
-        if rest:
-            more_a, more_b = design.with_(columns[rest], variance[rest])
-            a, b = a + more_a.sum(0), b + more_b.sum(0)
+    def best(rest: list[int]) -> tuple[int, float]:
+        a, b = design.joined(columns[rest], variance[rest])
         score = design.information(a, b, columns, variance)
         score[rest] = -torch.inf
-        at = int(score.nan_to_num(nan=-torch.inf).argmax())
+        score = score.nan_to_num(nan=-torch.inf)
+        order = score.argsort(descending=True, stable=True)[: min(_TRIED, len(score) - len(rest))]
+        growths = []
+        for some in order.split(_AT_ONCE):
+            more_a, more_b = design.with_(columns[some], variance[some])
+            after = design.covariance(a + more_a, b + more_b).diagonal(dim1=-2, dim2=-1)
+            growths.append((after / before).amax(-1).nan_to_num(nan=torch.inf))
+            surer = growths[-1] <= 1 + 1e-9
+            if bool(surer.any()):
+                at = int(some[int(surer.int().argmax())])
+                return at, float(score[at])
+        at = int(order[int(torch.cat(growths).argmin())])
         return at, float(score[at])
 
     reached = -math.inf

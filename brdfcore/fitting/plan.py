@@ -13,10 +13,12 @@ from ..models.form import Form, build
 from ..models.text import ParsedTerm, Tie, parse
 from ..parameters import Parameter
 from .effects import AUTO
+from .given import check_known, whole
 from .limits import check_max_theta, check_robust, checked_bounds
 from .losses import LOSSES
 
-OPTIMIZERS = ("auto", "least_squares", "lbfgs", "adam")
+GRADIENT = ("lbfgs", "adam")  # which follow the gradient alone
+OPTIMIZERS = ("auto", "least_squares", *GRADIENT)
 
 
 @dataclass(frozen=True)
@@ -83,11 +85,6 @@ def plan(
     if azimuth_observed:
         choices += tuple(_held_isotropic(form, parsed))
     fixed = dict(fixed or {})
-    for name, keys in (("gray", gray), ("per_channel", per_channel)):
-        if isinstance(keys, str):
-            raise ParameterError(
-                f"Expected {name} to be a list of keys, got the text {keys!r}. Write [{keys!r}].", field=name
-            )
     gray, per_channel = frozenset(gray), frozenset(per_channel)
     for name, known in (("fixed", fixed), ("gray", gray), ("per_channel", per_channel)):
         for key in known:
@@ -106,15 +103,9 @@ def plan(
     narrowed = checked_bounds(form, bounds, start, {*given, *fixed})
     further = [start] if set(given) - set(fixed) else []
     for values in starts:
-        if not isinstance(values, Mapping):
-            raise ParameterError(
-                f"Expected starts to be a list of mappings of keys to values, got {type(values).__name__} in it. "
-                "Pass [{key: value, ...}, ...].",
-                field="starts",
-            )
         for key in values:
             if key not in form.parameters:
-                raise unknown_name("a key of starts", str(key), form.parameters, field="starts")
+                raise unknown_name("a key of starts", key, form.parameters, field="starts")
         own = {key: _start(key, form.parameters[key], v, channels, gray, per_channel) for key, v in values.items()}
         further.append({**start, **own})
     return Plan(form, start, frozenset(fixed), gray, per_channel, choices, narrowed, tuple(further))
@@ -162,8 +153,8 @@ def _held_isotropic(form: Form, parsed: Sequence[ParsedTerm]) -> Iterator[str]:
 def _tensor(key: str, value: object) -> Tensor:
     """The value as a tensor; raises ParameterError where it is no number and no list of numbers."""
     numbers = value if isinstance(value, list | tuple) else [value]
-    if isinstance(value, Tensor) or all(isinstance(x, int | float) and not isinstance(x, bool) for x in numbers):
-        return torch.as_tensor(value, dtype=torch.float64).detach()
+    if all(isinstance(x, int | float) and not isinstance(x, bool) for x in numbers):
+        return torch.tensor(value, dtype=torch.float64)
     raise ParameterError(
         f"Expected {key} to be a number, or a list of one a channel, got {value!r}. Give it as such.", field=key
     )
@@ -224,11 +215,9 @@ def check(
             f'Expected model to be one text here, got "{AUTO}", which chooses among several. Use bc.fit for that.',
             field="model",
         )
-    if loss not in LOSSES:
-        raise unknown_name("a loss", loss, LOSSES, field="loss")
-    if optimizer not in OPTIMIZERS:
-        raise unknown_name("an optimizer", optimizer, OPTIMIZERS, field="optimizer")
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
+    check_known("a loss", loss, LOSSES, "loss")
+    check_known("an optimizer", optimizer, OPTIMIZERS, "optimizer")
+    if (number := whole(seed)) is None or not 0 <= number < 2**63:
         raise ParameterError(
             f"Expected seed to be a whole number from 0 to 2^63 - 1, got {seed!r}. Choose another.", field="seed"
         )

@@ -146,8 +146,8 @@ class Problem:
             r = r.detach()
         if self.plan.robust is None or self.robust_scale is None:
             return r.square(), r, slope
-        scale = self.robust_scale if which is None else self.robust_scale[which]
-        rho, r, root = softened(ROBUST[self.plan.robust], scale.reshape(-1, 1, 1), r)
+        scale = (self.robust_scale if which is None else self.robust_scale[which]).reshape(-1, 1, 1)
+        rho, r, root = softened(ROBUST[self.plan.robust], scale * data.counted, r)  # w s^2 rho(r^2 / (w s^2)) for w r^2
         return rho, r, slope * root
 
     def loss(self, x: Tensor, which: Tensor | None = None) -> Tensor:
@@ -195,17 +195,41 @@ class Problem:
             matrix[at] += rows @ rows.mT
         return Gram(loss, self.scatter_vector(gradient), self.scatter_matrix(matrix))
 
+    def gradient(self, x: Tensor, which: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """The loss (S,) of each row and the gradient (S, D) of half of it, as in its normal equations.
+
+        Of one channel no product of matrices is asked for: threads that LAPACK calls in cost more than few samples do.
+        """
+        self.evaluations += len(x)
+        mix, natural, starts = self.mix(x), self.natural(x), len(x)
+        loss = torch.zeros(starts, dtype=torch.float64)
+        right = torch.zeros_like(mix.value)  # (S, C, Q)
+        for at, _, piece in self.data.blocks(starts):
+            own = None if which is None else which[at]
+            data = piece if own is None else piece.rows(own)
+            columns = self.columns.all(rows_of(natural, at), data.g, at.stop - at.start, self.channels)
+            value = mix.value[at]
+            if self.channels == 1:
+                f = (value.unsqueeze(-1) * columns).sum(2)
+                rho, r, slope = self.residuals(f, data, own)
+                right[at] += (columns * (slope * r).unsqueeze(2)).sum(-1)
+            else:
+                rho, r, slope = self.residuals(_mixed(value, columns), data, own)
+                right[at] += (columns @ (slope * r).unsqueeze(-1)).squeeze(-1)
+            loss[at] += rho.sum((1, 2))
+        return loss, self.scatter_vector((mix.slopes * right.unsqueeze(-1)).sum(-2))
+
     def scatter_vector(self, by_channel: Tensor) -> Tensor:
         """(S, C, P) by channel and name, summed into (S, D)."""
         flat = self.index.reshape(-1)
         out = torch.zeros(len(by_channel), self.size, dtype=torch.float64)
-        return out.index_add_(1, flat, by_channel.reshape(len(by_channel), -1))
+        return out.index_add_(1, flat, by_channel.flatten(1))
 
     def scatter_matrix(self, by_channel: Tensor) -> Tensor:
         """(S, C, P, P) by channel and names, summed into (S, D, D)."""
         flat = (self.index.unsqueeze(-1) * self.size + self.index.unsqueeze(-2)).reshape(-1)
         out = torch.zeros(len(by_channel), self.size * self.size, dtype=torch.float64)
-        out.index_add_(1, flat, by_channel.reshape(len(by_channel), -1))
+        out.index_add_(1, flat, by_channel.flatten(1))
         return out.reshape(-1, self.size, self.size)
 
     def held(self, x: Tensor, gradient: Tensor) -> Tensor:

@@ -1,7 +1,7 @@
 """A fit's result: values with intervals, errors under every loss, a status in words, and what it cost."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -50,9 +50,9 @@ class Fit:
 
     plan, form, values, samples: what was asked, fitted, the best values, stored parameters only, and to what.
     parameters, standard_errors: key -> () or (C,); intervals: key -> (2,) or (C, 2), 95 %. NaN stands where there is no
-    number to give: in an interval for a value that was fixed or lies on an end of its box, and everywhere for one
-    that the data leave undetermined. `objective` is the loss that was minimised: chi-square where the samples' sigma
-    weighed it, else the error of that name.
+    number to give: in an interval for a value that was fixed or that the data hold on an end of its box (ends.py), and
+    everywhere for one that they leave undetermined. `objective` is what was minimised: chi-square where the samples'
+    sigma weighed the loss, the sum of rho under a robust form, else the error of that name.
 
     status              "converged"; "undetermined", converged but with values that the data leave free; or
                         "stopped_early". `message` says more
@@ -74,6 +74,7 @@ class Fit:
     loss: str
     objective: float
     weighed: bool  # whether the samples' sigma weighed the loss
+    robust_scale: float | None  # beyond which residuals count less, in their unit or in sigma, under a robust form
     status: str
     message: str
     undetermined: tuple[str, ...]
@@ -107,7 +108,7 @@ class Fit:
     @cached_property
     def certificate(self) -> Certificate:
         """The largest directional albedo and where, its limit towards grazing, reciprocity: made when first read."""
-        return certify(self.material)
+        return replace(certify(self.material), channel_names=self.samples.channels)
 
     @property
     def model(self) -> str:
@@ -122,6 +123,19 @@ class Fit:
         found = (self.covariance * scale * scale.unsqueeze(-1)).clamp(-1, 1)
         return found.fill_diagonal_(1.0)
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """What the fit was asked beside model, loss, seed and which values are fixed, gray or one a channel."""
+        plan = self.plan
+        return {
+            "bounds": {key: list(pair) for key, pair in plan.bounds.items()},
+            "starts": [{key: _numbers(value) for key, value in start.items()} for start in plan.starts],
+            "robust": plan.robust,
+            "robust_scale": self.robust_scale,
+            "max_theta_deg": None if plan.max_theta is None else math.degrees(plan.max_theta),
+            "conserve_energy": plan.conserve_energy,
+        }
+
     def units(self) -> dict[str, str]:
         """What each parameter is, with its unit."""
         return {key: parameter.description for key, parameter in self.form.all_parameters.items()}
@@ -133,14 +147,16 @@ class Fit:
             "material_text": str(self.material),
             "material": self.material.to_json(),
             "loss": self.loss,
-            "objective": _number(self.objective),
+            "weighed": self.weighed,
+            "options": self.options,
+            "objective": number(self.objective),
             "status": self.status,
             "message": self.message,
             "parameters": {key: _numbers(value) for key, value in self.parameters.items()},
             "standard_errors": {key: _numbers(value) for key, value in self.standard_errors.items()},
             "intervals": {key: _intervals(value) for key, value in self.intervals.items()},
             "units": self.units(),
-            "errors": {key: _number(value) for key, value in self.errors.items()},
+            "errors": {key: number(value) for key, value in self.errors.items()},
             "undetermined": list(self.undetermined),
             "combinations": [dict(one) for one in self.combinations],
             "singular_values": list(self.singular_values),
@@ -202,6 +218,7 @@ def _report(result: dict[str, Any], correlated: list[str]) -> str:
         lines.append(f"singular values of the scaled Jacobian: {singular[0]:.3g} down to {singular[-1]:.3g}")
     if correlated:
         lines.append("strongly correlated: " + ", ".join(correlated))
+    lines += _asked(result["options"], result["weighed"])
     lines += [f"note: {sentence}" for sentence in result["warnings"]]
     lines.append(result["certificate"]["verdict"])
     lines += table(result["ladder"])
@@ -216,6 +233,21 @@ def _report(result: dict[str, Any], correlated: list[str]) -> str:
     return "\n".join(lines)
 
 
+def _asked(options: dict[str, Any], weighed: bool) -> list[str]:
+    """The options that the fit was given, a line each kind."""
+    lines = []
+    if options["robust"]:
+        unit = " sigma" * weighed
+        lines.append(f"robust: {options['robust']}, residuals beyond {options['robust_scale']:.4g}{unit} count less")
+    if options["bounds"]:
+        lines.append("bounds: " + ", ".join(f"{key} [{a:.6g}, {b:.6g}]" for key, (a, b) in options["bounds"].items()))
+    if options["starts"]:
+        lines.append(f"starts given: {len(options['starts'])}")
+    if options["max_theta_deg"] is not None:
+        lines.append(f"directions up to {options['max_theta_deg']:.6g} degrees")
+    return lines
+
+
 def _row(key: str, value: float | None, interval: list[float] | None, without: str, what: str) -> str:
     number = "none" if value is None else f"{value:.6g}"
     span = without if interval is None else f"[{interval[0]:.6g}, {interval[1]:.6g}]"
@@ -223,15 +255,16 @@ def _row(key: str, value: float | None, interval: list[float] | None, without: s
 
 
 def _conservation(it: Conservation) -> dict[str, Any]:
-    return {**vars(it), "free_max_albedo": _number(it.free_max_albedo), "fixed": list(it.fixed)}
+    return {**vars(it), "free_max_albedo": number(it.free_max_albedo), "fixed": list(it.fixed)}
 
 
-def _number(value: float) -> float | None:
+def number(value: float) -> float | None:
+    """The number as JSON can hold it: None where it is infinite or NaN."""
     return value if math.isfinite(value) else None
 
 
 def _numbers(value: Tensor) -> Any:
-    return _number(value.item()) if value.ndim == 0 else [_number(v) for v in value.tolist()]
+    return number(value.item()) if value.ndim == 0 else [number(v) for v in value.tolist()]
 
 
 def _intervals(value: Tensor) -> Any:

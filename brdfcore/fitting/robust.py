@@ -1,10 +1,12 @@
-"""Robust forms of a loss: sum rho(r) for sum r^2, so that a few bad samples do not decide.
+"""Robust forms of a loss: sum w rho(r) for sum w r^2, so that a few bad samples do not decide.
 
     soft_l1    rho = 2 s^2 (sqrt(1 + r^2/s^2) - 1)            grows like |r| beyond the scale s
     cauchy     rho = s^2 ln(1 + r^2/s^2)                      grows like ln |r|
 
-Near 0 both are r^2. Where no scale is given it is a multiple of the residuals' spread, 1.4826 times their median
-absolute value: the multiple at which normal noise costs 5 % of the plain loss's precision.
+Near 0 both are r^2. A weight stands before rho: a sample of weight 2 is one that is there twice. Where the samples'
+sigma weighs the loss, r is counted in sigma instead. Where no scale is given it is a multiple of the residuals'
+spread, 1.4826 times their median absolute value: the multiple at which normal noise costs 5 % of the plain loss's
+precision. Spread and fit are repeated until the scale stands (search.py), for outliers inflate the first ones.
 A Gauss-Newton method sees them as residuals r rho'/sqrt(h) and derivatives sqrt(h) dr with h = rho' + 2 rho'' r^2, the
 primes by r^2, kept above 0 (Triggs et al. 2000, "Bundle adjustment: a modern synthesis", section 4.3).
 """

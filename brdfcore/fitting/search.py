@@ -22,7 +22,7 @@ from .plan import Plan
 from .problem import Problem
 from .projection import Projection
 from .result import Cost
-from .robust import ROBUST, SPREAD
+from .robust import ROBUST, SPREAD, Robust
 from .starts import rescan, scan, several_lobes
 from .variable_projection import variable_projection
 
@@ -30,11 +30,13 @@ SUBSET = 2000  # samples on which starts are told apart; the optimum is always p
 _STARTS = 4  # best points of the scan, which run as one batch; of one shape half of them
 _MANY_STARTS = 16  # the same of two lobes and more, whose optima are many
 _AGAIN = 2  # starts of each of several lobes, whose shapes are searched again beside the best of the others
-_DESCENTS = 2  # starts of Adam and LBFGS, which run one after the other
+_DESCENTS = 2  # starts of Adam and LBFGS
 _POLISH = 300  # their steps on all the data, after the subset
 _NONLINEAR = 6  # starts of a lone lobe under a loss that is not linear in f, whose steps move every reflectance
 _HOPELESS = 2.0  # times the best point's loss, from where a lone lobe's other points lead nowhere else
 _RACE_ALL = 1e-6  # of the loss, the same as the next where reflectances move too
+_TURNS = 20  # of spread and fit under a robust form; plain data take two, a fifth of gross outliers up to 14
+_STANDS = 0.01  # of the scale: what another turn would change, a hundredth of what the forms' efficiency is worth
 _RACE = 1e-4  # of the loss: what another step would gain once a start's end is clear
 
 Say = Callable[[str, float, float], None]
@@ -72,32 +74,75 @@ def search(plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, se
             None if plan.robust_scale is None else torch.full((len(samples),), plan.robust_scale, dtype=torch.float64)
         )
         return _found(plan, samples, loss, optimizer, seed, say, given)
-    # outliers inflate the spread about the plain optimum, so it is taken again about the robust one
-    plain = _found(replace(plan, robust=None), samples, loss, optimizer, seed, _part(say, 0.0, 0.4), None)
-    scale = _spread(plain) * ROBUST[plan.robust].multiple
-    robust = _found(plan, samples, loss, optimizer, seed, _part(say, 0.4, 0.8), scale)
-    scale = _spread(robust) * ROBUST[plan.robust].multiple
-    problem = Problem(plan, samples, LOSSES[loss], robust.problem.data.scales, scale)
-    outcome = robust.outcome
+    near = near_scale(plan, samples, loss, optimizer, seed, _part(say, 0.0, 0.4))
+    found = _found(plan, samples, loss, optimizer, seed, _part(say, 0.4, 0.9), near.problem.robust_scale)
+    before = found.problem.loss(near.outcome.x, torch.arange(len(samples)))
+    lower = before < (1 - _RACE_ALL) * found.outcome.loss
+    if bool(lower.any()):
+        x = torch.where(lower.unsqueeze(-1), near.outcome.x, found.outcome.x)
+        found = replace(found, outcome=found.outcome._replace(x=x))
+    return joined(near, _settled(plan, ROBUST[plan.robust], found))
+
+
+def near_scale(plan: Plan, samples: Sequence[Samples], loss: str, optimizer: str, seed: int, say: Say) -> Found:
+    """A robust optimum of a subset, at the scale that its own residuals make: a first one, of few samples."""
+    few = _subset(samples, seed)
+    plain = _found(replace(plan, robust=None, robust_scale=None), few, loss, optimizer, seed, say, None)
+    return _settled(plan, ROBUST[plan.robust or ""], plain)
+
+
+def _settled(plan: Plan, form: Robust, found: Found) -> Found:
+    """The robust optimum next to what was found, at the scale that its own residuals make.
+
+    Outliers draw an optimum to themselves, which inflates the spread about it: fit and spread take turns.
+    """
+    scale = form.multiple * _spread(found)
+    for _ in range(_TURNS):
+        found = _polished(plan, found, scale, _RACE)
+        last, scale = scale, form.multiple * _spread(found)
+        if bool(((scale - last).abs() < _STANDS * last).all()):
+            break
+    return _polished(plan, found, scale)
+
+
+def _polished(plan: Plan, found: Found, scale: Tensor, tolerance: float = DECREMENT) -> Found:
+    """The robust optimum at this scale (M,) that what was found leads to."""
+    x, which = found.outcome.x, torch.arange(len(scale))
+    problem = Problem(plan, [], found.problem.loss_kind, robust_scale=scale, data=found.problem.data)
+    outcome = Outcome(x, problem.loss(x, which), torch.ones(len(x), dtype=torch.bool), 0)
     if problem.size:
-        outcome = least_squares(problem, outcome.x, torch.arange(len(samples)), on_step=_tell(say, 0.8, 0.9))
+        outcome = least_squares(problem, x, which, tolerance)
+    return joined(
+        found,
+        replace(
+            found, problem=problem, outcome=outcome, evaluations=problem.evaluations, iterations=outcome.iterations
+        ),
+    )
+
+
+def joined(before: Found, after: Found) -> Found:
+    """What came after, its cost with that of what came before."""
     return replace(
-        robust,
-        problem=problem,
-        outcome=outcome,
-        evaluations=plain.evaluations + robust.evaluations + problem.evaluations,
-        iterations=plain.iterations + robust.iterations + outcome.iterations,
+        after, evaluations=before.evaluations + after.evaluations, iterations=before.iterations + after.iterations
     )
 
 
 def _spread(found: Found) -> Tensor:
-    """The spread of each material's plain residuals where it ended, (M,); above 0 where the fit is exact."""
+    """The spread of each material's plain residuals where it ended, (M,); above 0 where the fit is exact.
+
+    It is the residuals' before their weights, each counted as often as its weight says.
+    """
     problem, which = found.problem, torch.arange(len(found.outcome.x))
     plain = Problem(replace(problem.plan, robust=None), [], problem.loss_kind, data=problem.data)
     data = problem.data.rows(which)
-    r = plain.residuals(problem.f(found.outcome.x, data), data, which)[1].flatten(1)
-    least = 1e-12 * (problem.squares / r.shape[1]).sqrt()
-    return torch.maximum(SPREAD * r.abs().median(1).values, least.clamp(min=1e-300))
+    r = plain.residuals(problem.f(found.outcome.x, data), data, which)[1]
+    size = (r / data.counted).abs().flatten(1)
+    weight = data.root_factor.square().masked_fill(data.root_weight[:, :1] <= 0, 0).expand_as(r).flatten(1)
+    size, order = size.sort(1)
+    before = weight.gather(1, order).cumsum(1)
+    middle = (before < before[:, -1:] / 2).sum(1, keepdim=True).clamp(max=size.shape[1] - 1)
+    least = 1e-12 * (problem.squares / before[:, -1].clamp(min=1e-300)).sqrt()
+    return torch.maximum(SPREAD * size.gather(1, middle)[:, 0], least.clamp(min=1e-300))
 
 
 def _found(
@@ -108,8 +153,7 @@ def _found(
     whole = Problem(plan, samples, kind, robust_scale=robust_scale)
     coarse, few = whole, list(samples)
     if len(samples[0]) > SUBSET:
-        chosen = torch.randperm(len(samples[0]), generator=torch.Generator().manual_seed(seed))[:SUBSET]
-        few = [one.subset(chosen.sort().values) for one in samples]
+        few = _subset(samples, seed)
         coarse = Problem(plan, few, kind, whole.data.scales, robust_scale)
     if not whole.size:
         x, which = torch.zeros(len(samples), 0, dtype=torch.float64), torch.arange(len(samples))
@@ -118,6 +162,14 @@ def _found(
     if optimizer in ("auto", "least_squares"):
         return _race(whole, coarse, few, optimizer, seed, say)
     return _descents(whole, coarse, few, optimizer, seed, say)
+
+
+def _subset(samples: Sequence[Samples], seed: int) -> list[Samples]:
+    """Those of the samples on which starts are told apart, the same of every material; all where they are few."""
+    if len(samples[0]) <= SUBSET:
+        return list(samples)
+    chosen = torch.randperm(len(samples[0]), generator=torch.Generator().manual_seed(seed))[:SUBSET].sort().values
+    return [one.subset(chosen) for one in samples]
 
 
 def _kindred(problem: Problem, samples: Sequence[Samples]) -> Projection:
@@ -208,25 +260,19 @@ def _best(loss: Tensor, which: Tensor, materials: int) -> Tensor:
 
 
 def _descents(whole: Problem, coarse: Problem, few: Sequence[Samples], optimizer: str, seed: int, say: Say) -> Found:
-    """Adam or LBFGS from a few starts one after the other, then from the best on all the data."""
+    """Adam or LBFGS from a few starts, then from the best on all the data."""
     run = {"adam": adam, "lbfgs": lbfgs}[optimizer]
     starts, _ = scan(coarse, _kindred(coarse, few), _DESCENTS, seed)
-    ends: list[Outcome] = []
-    share = 0.9 / starts[..., 0].numel()
-    for material in range(whole.materials):
-        which = torch.tensor([material])
-        runs: list[Outcome] = []
-        for start in starts[material]:
-            done = 0.05 + share * (len(ends) * starts.shape[1] + len(runs))
-            runs.append(run(coarse, start.unsqueeze(0), which, on_step=_tell(say, done, done + share)))
-        best = min(runs, key=lambda outcome: float(outcome.loss[0]))
-        if coarse is not whole:
-            best = run(whole, best.x, which, max_iterations=_POLISH)
-        ends.append(Outcome(best.x, best.loss, best.converged, sum(r.iterations for r in runs)))
-    x, loss, converged, steps, _ = zip(*ends, strict=True)
-    outcome = Outcome(torch.cat(x), torch.cat(loss), torch.cat(converged), sum(steps))
+    materials, each = starts.shape[:2]
+    which = torch.arange(materials).repeat_interleave(each)
+    found = run(coarse, starts.reshape(-1, whole.size), which, on_step=_tell(say, 0.05, 0.7))
+    steps = found.iterations
+    best = found.pick(_best(found.loss, which, materials))
+    if coarse is not whole:
+        best = run(whole, best.x, torch.arange(materials), max_iterations=_POLISH, on_step=_tell(say, 0.7, 0.9))
+        steps += best.iterations
     evaluations = whole.evaluations + (coarse.evaluations if coarse is not whole else 0)
-    return Found(whole, outcome, starts.shape[1], evaluations, sum(steps), optimizer)
+    return Found(whole, best._replace(iterations=steps), each, evaluations, steps, optimizer)
 
 
 def _part(say: Say, begin: float, end: float) -> Say:

@@ -15,10 +15,12 @@ from ..formats.samples import Samples
 from ..models.form import Term
 from .losses import LOSSES
 from .plan import Plan
+from .problem import Problem
 
 _NEAR_MIRROR = math.radians(10)  # of theta_h: glossy lobes are within it
 _FRESNEL = 0.01  # of Schlick's rise: a quarter of f0 = 0.04, seen from theta_d = 53 deg on
 _SPREAD = math.radians(1)  # within which angles are one angle
+_BRIGHT = 3.0  # times the fitted values, by which values in percent or counts are beyond any reflectance
 _DECADES = 4  # of the largest value over the median beyond which the large ones decide a linear loss alone
 
 
@@ -105,8 +107,9 @@ def warnings(plan: Plan, support: Support, y: Tensor, typical: Tensor, loss: str
     each = sum(size == channels for size in sizes.values())
     if sum(sizes.values()) > channels * count or each > count:
         found.append(
-            f"{sum(sizes.values())} values are fitted to {count} samples of {channels} channels, which are too few "
-            "to determine them all. Fix some, or measure more."
+            f"{_counted(sum(sizes.values()), 'value is', 'values are')} fitted to "
+            f"{_counted(count, 'sample', 'samples')} of {_counted(channels, 'channel', 'channels')}, too few to "
+            "determine all. Fix some, or measure more."
         )
     has_lobe = bool(concerned - {"directions"})
     sees_peak = has_lobe and LOSSES[loss].statistical
@@ -121,6 +124,32 @@ def warnings(plan: Plan, support: Support, y: Tensor, typical: Tensor, loss: str
         )
         for top, ratio, same in rows
     ]
+
+
+def _counted(count: int, one: str, more: str) -> str:
+    return f"{count} {one if count == 1 else more}"
+
+
+def too_bright(problem: Problem, x: Tensor) -> list[tuple[str, ...]]:
+    """A sentence for each material of optima x (M, D) that shines far less than it should with a reflectance of 1."""
+    plan, data = problem.plan, problem.data
+    found: list[tuple[str, ...]] = [()] * len(x)
+    scales = [f"{term.label}.{term.model.scale}" for term in plan.form.terms]
+    full = torch.zeros(len(x), dtype=torch.bool)
+    for key in scales:
+        if key in plan.free:
+            full |= (x[:, problem.slices[key]] >= plan.form.parameters[key].high).any(-1)
+    for row in full.nonzero()[:, 0].tolist():
+        which = torch.tensor([row])
+        pieces = [piece.rows(which) for piece in data.chunks(1)]
+        ratio = torch.cat([(piece.y / problem.f(x[which], piece).clamp(min=1e-300)).flatten() for piece in pieces])
+        counted = torch.cat([piece.root_weight.expand_as(piece.y).flatten() for piece in pieces]) > 0
+        if counted.any() and (times := float(ratio[counted].median())) > _BRIGHT:
+            found[row] = (
+                f"Half of the values are more than {times:.2g} times what this material makes with reflectances of at "
+                "most 1. Check the unit and the quantity (percent, counts, a reflectance factor), or add a lobe.",
+            )
+    return found
 
 
 def _of_values(largest: float, ratio: float, loss: str, *, free: bool, same: bool) -> Iterator[str]:

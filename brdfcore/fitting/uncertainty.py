@@ -6,10 +6,11 @@ Where the samples' sigma is known, 1.96 standard errors make an interval. Where 
 degrees of freedom that the few samples a value hangs on leave. Such intervals hold for noise that grows with the
 value, for weights and for samples of weight 0, and are wider than those of a known sigma.
 
-A value stored as its logarithm gets an interval around the logarithm. A value on an end of its box is held there for
-the others and has no interval, unless so little presses it there that the data say nothing of it. No value that takes
-part in a direction that the data leave free (identifiability.py) has an interval; in those of the others that
-direction counts with the whole range that is searched along it.
+A value stored as its logarithm gets an interval around the logarithm. A value that the data hold on an end of its box
+(ends.py) is fixed there for the others and has no interval; one that lies on its end by chance is free for the others,
+and its own interval reaches inwards from there. Intervals are cut at the box. No value that takes part in a direction
+that the data leave free (identifiability.py) has an interval; in those of the others that direction counts with the
+whole range that is searched along it.
 """
 
 import math
@@ -19,6 +20,7 @@ import torch
 from torch import Tensor
 
 from ..errors import SamplesError
+from .ends import certain
 from .identifiability import LENGTH, RANK, Spectrum, Unseen, is_suspect, magnitudes, ranges, singular_values, unseen
 from .noise import is_known, noise
 from .problem import Gram, Problem
@@ -39,7 +41,8 @@ class Uncertainty:
     chain: Tensor  # (M, D), derivatives of the natural values by the raw ones
     undetermined: Tensor  # (M, D) bool
     vague: Tensor  # (M, D) bool, with an interval that is as long as the range that is searched
-    held: Tensor  # (M, D) bool
+    held: Tensor  # (M, D) bool, by the data on an end of the box
+    by_chance: Tensor  # (M, D) bool, on an end of the box that noise alone may have led to
     freedom: Tensor  # (M,) residuals that weigh anything, less the directions that are determined
     unseen: tuple[Unseen, ...]  # one a material
     singular_values: tuple[tuple[float, ...], ...]  # one a material, of all that is not held
@@ -55,9 +58,9 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     if problem.size == 0:
         none, square = x.bool(), x.new_zeros(len(x), 0, 0)
         blank = (Unseen.nothing(0),) * len(x)
-        return Uncertainty(x, x, x, square, x, none, none, none, counted, blank, ((),) * len(x))
+        return Uncertainty(x, x, x, square, x, none, none, none, none, counted, blank, ((),) * len(x))
     gram = gram or problem.gram(x, which)
-    if not all(bool(part.isfinite().all()) for part in (x, gram.gradient, gram.matrix)):
+    if not all(bool(part.isfinite().all()) for part in (x, gram.loss, gram.gradient, gram.matrix)):
         size = problem.data.y.abs()
         raise SamplesError(
             "Expected values to be of a size whose squares a double holds under this loss, got magnitudes from "
@@ -67,9 +70,13 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     matrix, diagonal = gram.matrix, gram.matrix.diagonal(dim1=-2, dim2=-1)
     blind = diagonal <= (_SILENT**2 * problem.squares).unsqueeze(-1)
     pressed = gram.gradient.abs() > _PRESSED * (diagonal * gram.loss.unsqueeze(-1)).sqrt()
-    held = problem.held(x, gram.gradient) & pressed
-    spectrum = Spectrum.of(matrix, ~held & ~blind)
+    pressed &= problem.held(x, gram.gradient)
+    spectrum = Spectrum.of(matrix, ~pressed & ~blind)
     sums = noise(problem, x, spectrum.inverse(), which)
+    held = certain(gram, pressed, blind, sums.level)
+    if bool((pressed & ~held).any()):
+        spectrum = Spectrum.of(matrix, ~held & ~blind)
+        sums = sums if is_known(problem) else noise(problem, x, spectrum.inverse(), which)
     lengths = ranges(problem)
     loose = held & ~blind & _loose(problem, gram, spectrum, sums.level, lengths)
     suspect = is_suspect(matrix, sums.level, spectrum, lengths) | (loose | (blind & ~held)).any(-1)
@@ -110,7 +117,9 @@ def uncertainty(problem: Problem, x: Tensor, gram: Gram | None = None) -> Uncert
     covariance = torch.where(both, chain.unsqueeze(-1) * covariance * chain.unsqueeze(-2), math.nan)
     values = singular_values(matrix, ~held, blind)
     ends = _natural(problem, x, error, factor, chain)
-    return Uncertainty(*ends, covariance, chain, undetermined, vague, held, freedom, tuple(found), values)
+    return Uncertainty(
+        *ends, covariance, chain, undetermined, vague, held, pressed & told, freedom, tuple(found), values
+    )
 
 
 def _loose(problem: Problem, gram: Gram, spectrum: Spectrum, level: Tensor, lengths: Tensor) -> Tensor:

@@ -12,9 +12,10 @@ from .data import stacked_weights
 from .identifiability import name_of, named
 from .levenberg_marquardt import Outcome
 from .losses import root_mean
+from .plan import GRADIENT
 from .problem import Problem
 from .result import Cost, Fit
-from .support import supports, warnings
+from .support import supports, too_bright, warnings
 from .uncertainty import Uncertainty, uncertainty
 
 
@@ -38,17 +39,20 @@ def fits(
     chi_square: list[float] | None = None
     if problem.data.sigma is not None:
         f = torch.cat([problem.f(x, piece) for piece in problem.data.chunks(len(x))], dim=-1)  # (M, C, N)
-        chi_square = ((f - problem.data.y) / problem.data.sigma).square().sum((1, 2)).tolist()
+        squares = ((f - problem.data.y) / problem.data.sigma).square()
+        chi_square = torch.where(problem.data.root_weight > 0, squares, 0.0).sum((1, 2)).tolist()
     minima = outcome.loss
     if problem.loss_kind.is_mean and not (weighed or plan.robust):
         minima = root_mean(minima, stacked_weights(fitted, problem.loss_kind), problem.channels)
+    scales = None if plan.robust is None or problem.robust_scale is None else problem.robust_scale.tolist()
     freedom, objectives, ends = known.freedom.tolist(), minima.tolist(), outcome.converged.tolist()
     typical = torch.as_tensor(problem.data.scales.y, dtype=torch.float64).reshape(-1)
     told = warnings(plan, supports(fitted[0]), problem.data.y, typical, problem.loss_kind.name)
+    bright = too_bright(problem, x)
     names = [name_of(problem, at, channels) for at in range(problem.size)]
     covariances = _certain(known.covariance, names)
     of_row = {key: value.reshape(len(x), *plan.start[key].shape).unbind() for key, value in values.items()}
-    held, vague = known.held.tolist(), known.vague.tolist()
+    held, by_chance, vague = (flags.tolist() for flags in (known.held, known.by_chance, known.vague))
     found, spent = [], cost()
     for row, (samples, whole) in enumerate(zip(fitted, given, strict=True)):
         parameters, standard_errors, intervals = described[row]
@@ -70,11 +74,20 @@ def fits(
                 loss=problem.loss_kind.name,
                 objective=objectives[row],
                 weighed=weighed,
+                robust_scale=None if scales is None else scales[row],
                 status=("undetermined" if undetermined else "converged") if ends[row] else "stopped_early",
                 message=_message(
-                    problem, held[row], vague[row], undetermined, freedom[row], converged=ends[row], weighed=weighed
+                    problem,
+                    held[row],
+                    by_chance[row],
+                    vague[row],
+                    undetermined,
+                    freedom[row],
+                    converged=ends[row],
+                    weighed=weighed,
+                    by_gradient=spent.optimizer in GRADIENT,
                 ),
-                warnings=told[row],
+                warnings=(*told[row], *bright[row]),
                 choices=plan.choices,
                 fixed=tuple(sorted(plan.fixed)),
                 gray=tuple(sorted(plan.gray)),
@@ -143,26 +156,34 @@ def _described(problem: Problem, values: dict[str, Tensor], known: Uncertainty) 
 def _message(
     problem: Problem,
     held: list[bool],
+    by_chance: list[bool],
     vague: list[bool],
     undetermined: Sequence[str],
     freedom: int,
     *,
     converged: bool,
     weighed: bool,
+    by_gradient: bool,
 ) -> str:
-    """What the user must know of a result, in sentences; `held` and `vague` are by raw position."""
+    """What the user must know of a result, in sentences; `held`, `by_chance` and `vague` are by raw position."""
     if not problem.size:
         parts = ["Every value is fixed, so this is an evaluation."]
     elif converged:
         parts = ["The optimum was reached; no step gains more than rounding."]
     else:
-        parts = [
-            "The optimizer stopped before the optimum; treat values and intervals with care, or use least_squares."
-        ]
+        advice = "use least_squares" if by_gradient else "give starts near it"
+        parts = [f"The optimizer stopped before the optimum; treat values and intervals with care, or {advice}."]
     on_end = [key for key, at in problem.slices.items() if any(held[at])]
     if on_end:
         where = " in some channel" if problem.channels > 1 else ""
         parts.append(f"{', '.join(on_end)} ended on an end of the box{where}, so no interval is given there.")
+    near_end = [key for key, at in problem.slices.items() if any(by_chance[at])]
+    if near_end:
+        where = " in some channel" if problem.channels > 1 else ""
+        parts.append(
+            f"{', '.join(near_end)} ended on an end of the box{where}, where noise alone may have put it, so the "
+            "interval reaches inwards from there."
+        )
     together = [words for words in undetermined if " with " in words]
     alone = [words for words in undetermined if words not in together]
     if alone:
@@ -179,6 +200,10 @@ def _message(
         )
     if problem.data.sigma is None and freedom <= 0:
         parts.append("There are no more samples than values, so no interval can be given.")
-    if weighed:
+    if weighed and problem.plan.robust is None:
         parts.append("Samples were weighted by 1/sigma^2, so the minimised loss is chi-square.")
+    elif weighed:
+        parts.append(
+            f"Residuals were counted in sigma and made {problem.plan.robust}, so the minimised loss is not chi-square."
+        )
     return " ".join(parts)

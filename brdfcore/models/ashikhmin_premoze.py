@@ -28,6 +28,7 @@ class AshikhminPremoze(FresnelLobe, GaussianSlopes):
     """A lobe that any density of half vectors makes."""
 
     name = "ashikhmin_premoze"
+    good_for = "Soft plain or brushed gloss that grows darker towards grazing angles."
     lobe_needs = ("e2", "ci", "co", "over_hz")
 
     @property

@@ -30,6 +30,7 @@ class AshikhminShirley(FresnelLobe, HeightPower):
     """A power of the half vector's height, with an exponent that turns with the azimuth."""
 
     name = "ashikhmin_shirley"
+    good_for = "Polished or brushed surfaces whose highlight brightens towards grazing angles."
     option_groups = (ISOTROPY, ("schlick", "scaled", "constant"))
     lobe_needs = ("over_ci", "over_co", "over_h_dot_wo")
 

@@ -22,6 +22,7 @@ class AshikhminShirleyDiffuse(CoupledDiffuse):
     """A reciprocal diffuse term for below a Fresnel lobe."""
 
     name = "ashikhmin_shirley_diffuse"
+    good_for = "The body colour under a polished coat, such as varnish; dims towards grazing angles."
     basis_needs = ("ci", "co")
 
     def transmitted(self, g: Geometry) -> Tensor:

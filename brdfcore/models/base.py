@@ -25,6 +25,7 @@ class Model(ABC):
     """A lobe or a diffuse term, with its options chosen: one word of each group, the first of a group the default."""
 
     name: ClassVar[str]
+    good_for: ClassVar[str]  # one short sentence in plain words: surfaces that it suits, and where it does not
     option_groups: ClassVar[tuple[tuple[str, ...], ...]] = ()
     apart: ClassVar[tuple[tuple[str, str], ...]] = ()  # pairs of options of which a choice holds one at most
     reciprocal: ClassVar[bool] = True
@@ -151,6 +152,7 @@ class Model(ABC):
         declared = dict.fromkeys(p for choice in cls.choices() for p in choice.parameters)
         return {
             "name": cls.name,
+            "good_for": cls.good_for,
             "summary": text.partition("\n")[0],
             "text": text,
             "options": [list(group) for group in cls.option_groups],

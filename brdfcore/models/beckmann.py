@@ -40,6 +40,7 @@ class Beckmann(SmithLobe, GaussianSlopes):
     """A lobe with Gaussian tails."""
 
     name = "beckmann"
+    good_for = "Rough metals and plastics whose highlight falls off quickly, without a wide glow."
 
     @property
     def normal_needs(self) -> frozenset[str]:

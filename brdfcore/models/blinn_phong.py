@@ -24,6 +24,7 @@ class BlinnPhong(ScaledLobe, HeightPower):
     """An isotropic power lobe without Fresnel or shadowing."""
 
     name = "blinn_phong"
+    good_for = "Simple round highlights, as older renderers draw them; they fade towards grazing angles."
     option_groups = ()
     lobe_needs = ("e2",)
 

@@ -29,6 +29,7 @@ class CookTorrance(FresnelLobe, GaussianSlopes):
     """An isotropic microfacet lobe whose shadowing has a kink."""
 
     name = "cook_torrance"
+    good_for = "Metals and plastics that are equally rough in every direction; none that are brushed."
     option_groups = (FRESNEL,)
     lobe_needs = ("e2", "over_ci", "over_co", "over_hz")
 

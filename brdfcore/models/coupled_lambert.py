@@ -21,6 +21,7 @@ class CoupledLambert(CoupledDiffuse):
     """A diffuse term that dims where the lobe takes the light."""
 
     name = "coupled_lambert"
+    good_for = "The body colour of plastics and paints, dimmed where the gloss above takes the light."
     basis_needs = ("h_dot_wo",)
 
     def transmitted(self, g: Geometry) -> Tensor:

@@ -30,6 +30,7 @@ class Edwards(ScaledLobe):
     """A lump on the disk that the half vectors above the horizon project to."""
 
     name = "edwards"
+    good_for = "Highlights that end at a clear rim; changes when light and viewer swap places."
     reciprocal = False
     lobe_needs = ("p", "q", "e2", "co", "over_ci", "over_hz")
     pdf_needs = frozenset(lobe_needs) - {"over_ci"}

@@ -36,6 +36,7 @@ class Ggx(SmithLobe):
     """A lobe with long tails."""
 
     name = "ggx"
+    good_for = "Rough metals and plastics whose highlight has a bright core and a wide glow."
     width = slope_width("width of the distribution of slopes")
 
     @property

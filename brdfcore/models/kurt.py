@@ -29,6 +29,7 @@ class Kurt(KurtFamily):
     """A Gaussian-slope lobe whose shadowing exponent is fitted to the material."""
 
     name = "kurt"
+    good_for = "Close fits to measured metals, paints and cloth; may reflect too much at grazing angles."
     shape = (Parameter("alpha", 0.1, 0.0, 1.0, "shadowing exponent [1]", search=(0.0, 0.5)),)
 
     def over_shadowing(self, values: Values, g: Geometry) -> Tensor:

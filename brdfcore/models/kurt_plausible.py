@@ -26,6 +26,7 @@ class KurtPlausible(KurtFamily):
     """The lobe without a shadowing exponent."""
 
     name = "kurt_plausible"
+    good_for = "Smooth to rough metals and paints; too bright at grazing angles if extremely rough."
 
     def over_shadowing(self, values: Values, g: Geometry) -> Tensor:
         """1 / max(ci, co) [1], (..., 1)."""

@@ -28,6 +28,7 @@ class Lafortune(ScaledLobe):
     """A power of a scaled scalar product."""
 
     name = "lafortune"
+    good_for = "Highlights beside the mirror direction or back to the light; several match odd data."
     lobe_needs = ("xi", "yi", "ci", "xo", "yo", "co")
     pdf_needs = frozenset(lobe_needs)
     shape = (

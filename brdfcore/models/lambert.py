@@ -21,6 +21,7 @@ class Lambert(Diffuse):
     """The same radiance in every direction."""
 
     name = "lambert"
+    good_for = "Matt paint, paper and plaster: equally bright from every side."
 
     def basis(self, values: Values, g: Geometry) -> tuple[Tensor, ...]:
         """1/pi, for every pair of directions."""

@@ -53,6 +53,7 @@ class OrenNayar(CosineSampled):
     """A diffuse term of V-shaped grooves."""
 
     name = "oren_nayar"
+    good_for = "Rough matt surfaces such as clay, sand and cloth, which look flat and bright to the rim."
     option_groups = (("qualitative", "energy_preserving"),)
     parameters = (
         KD,

@@ -22,6 +22,7 @@ class Ward(WardFamily):
     """Ward's original normalisation."""
 
     name = "ward"
+    good_for = "Brushed metal and plain gloss, to match published values; too bright close to grazing."
     lobe_needs = ("over_ci", "over_co")
 
     def factor(self, g: Geometry, exponent: Tensor) -> Tensor:

@@ -22,6 +22,7 @@ class WardBounded(WardFamily):
     """Ward's lobe, nowhere above the energy that comes in."""
 
     name = "ward_bounded"
+    good_for = "Brushed metal, linoleum, satin paint; never reflects more than it receives."
     lobe_needs = ("e2", "over_hz")
 
     def factor(self, g: Geometry, exponent: Tensor) -> Tensor:

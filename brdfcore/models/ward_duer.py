@@ -21,6 +21,7 @@ class WardDuer(WardFamily):
     """Ward's lobe, brighter towards grazing angles."""
 
     name = "ward_duer"
+    good_for = "Plain or brushed gloss that brightens at low angles; can be too bright from 82 degrees on."
     lobe_needs = ("over_ci", "over_co")
 
     def factor(self, g: Geometry, exponent: Tensor) -> Tensor:

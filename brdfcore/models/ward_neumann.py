@@ -20,6 +20,7 @@ class WardNeumann(WardFamily):
     """Ward's lobe with an albedo below rs."""
 
     name = "ward_neumann"
+    good_for = "Plain or brushed gloss that must not gain energy; too dark in low-lying light."
     lobe_needs = ("over_ci", "over_co")
 
     def factor(self, g: Geometry, exponent: Tensor) -> Tensor:

@@ -19,6 +19,7 @@ from torch import Tensor
 
 from ..errors import InvalidValueError, unknown_name
 from ..geometry import from_angles
+from ..tabulated import Tabulated
 from ._figure import COLOURS, new_figure
 
 if TYPE_CHECKING:
@@ -26,9 +27,13 @@ if TYPE_CHECKING:
 
     from ..formats.samples import Samples
     from ..models.material import Material
-    from ..tabulated import Tabulated
 
-SCALES = ("linear", "cube_root", "log")
+_RADIUS = {
+    "linear": "radius and rings: f [1/sr]",
+    "cube_root": "radius: cube root of f, rings: f [1/sr]",
+    "log": "radius: log of f, rings: f [1/sr]",
+}
+SCALES = tuple(_RADIUS)
 _PANELS = 6
 _MANY = 1000  # points that an SVG draws one by one; more become a picture in it
 _ROW = 1.75  # inches
@@ -92,7 +97,12 @@ def drawn_channel(
     material: "Material | Tabulated", samples: "Samples | None", channel: str | int | None
 ) -> tuple[int, str]:
     """The index and the name of the channel that is drawn."""
-    names = samples.channels if samples is not None else tuple(str(i) for i in range(material.channels))
+    if samples is not None:
+        names = samples.channels
+    elif isinstance(material, Tabulated):
+        names = material.channel_names
+    else:
+        names = tuple(str(i) for i in range(material.channels))
     if channel is None:
         if samples is None or len(names) == 1:
             return 0, names[0] if len(names) > 1 else ""
@@ -164,20 +174,25 @@ def _draw(
     columns = {1: 1, 2: 2, 4: 2}.get(len(incidences), 3)
     rows = math.ceil(len(incidences) / columns)
     wrapped = textwrap.wrap(title, 34 * columns)
-    top, bottom = 0.35 + 0.18 * len(wrapped), 0.55  # inches for the title and the caption
+    measured = any(y.numel() for _, y in points)
+    what = [_RADIUS[scale], *notes, "curve: model", "points: measured" if measured else ""]
+    caption = _lines(what, 45 * columns) + _lines(["arrow: to the light", "dashed: mirror direction"], 45 * columns)
+    top, bottom = 0.35 + 0.18 * len(wrapped), 0.25 + 0.15 * len(caption)  # inches for the title and the caption
     width, height = 2.9 * columns, _ROW * rows + top + bottom
     figure = new_figure(width, height)
     for i, (curve, measurement, incidence) in enumerate(zip(curves, points, incidences, strict=True)):
         x, y = 2.9 * (i % columns) + 0.35, height - top - _ROW * (i // columns) - 1.4
         place = (x / width, (y - 0.55) / height, 2.2 / width, 2.2 / height)  # a square, of which the upper half shows
         _panel(figure.add_axes(place, projection="polar"), curve, measurement, incidence, scale)
-    radius = {"linear": "radius: f [1/sr]", "cube_root": "radius: cube root of f", "log": "radius: log of f"}[scale]
-    measured = any(y.numel() for _, y in points)
-    parts = [radius, *notes, "curve: model", "points: measured" if measured else ""]
     figure.text(0.5, 1 - 0.12 / height, "\n".join(wrapped), ha="center", va="top", fontsize=10)
-    caption = ", ".join(part for part in parts if part) + "\narrow: towards the light; dashed: mirror direction"
-    figure.text(0.5, 0.1 / height, caption, ha="center", va="bottom", fontsize=8)
+    figure.text(0.5, 0.1 / height, "\n".join(caption), ha="center", va="bottom", fontsize=8)
     return figure
+
+
+def _lines(parts: Sequence[str], width: int) -> list[str]:
+    """The parts that are not empty with commas between, in lines that break after a comma where they can."""
+    whole = ", ".join(part.replace(" ", "\N{NO-BREAK SPACE}") for part in parts if part)
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in textwrap.wrap(whole, width, break_on_hyphens=False)]
 
 
 def _panel(

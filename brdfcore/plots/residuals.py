@@ -1,13 +1,13 @@
 """What a fit leaves unexplained, by angle: residuals against theta_o, one panel an incidence, and against theta_h.
 
-A residual is data minus model in units of the samples' sigma where that is known, so that 95 % of pure noise lies in
-the shaded band of 2 sigma; else it is relative, (y - f) / (y + d) with d = 1 % of the median positive y, as in the loss
-`relative` (either way the cosine cancels). theta_o is positive on the mirror side of the normal, theta_h is the half
-vector's angle from the normal. Up to six angles of incidence have a panel each, and a colour and a marker that they
-keep in the panel of theta_h; more of them share six bands of as many samples each. A black line joins the medians of
-tenths of the samples, where there are enough: noise scatters about 0, a wrong shape bends away from it. Of many samples
-20,000 are drawn, of several channels one, the brightest unless named. Residuals far beyond the others are drawn as
-triangles on the edge.
+A residual is model minus measurement, as in the losses: above 0 the model is too bright. It is in units of the samples'
+sigma where that is known, so that 95 % of pure noise lies in the shaded band of 2 sigma; else it is relative, (f - y) /
+(y + d) with d = 1 % of the median positive y, as in the loss `relative` (either way the cosine cancels). theta_o is
+positive on the mirror side of the normal, theta_h is the half vector's angle from the normal. Up to six angles of
+incidence have a panel each, and a colour and a marker that they keep in the panel of theta_h; more of them share six
+bands of as many samples each. A black line joins the medians of tenths of the samples, where there are enough: noise
+scatters about 0, a wrong shape bends away from it. Of many samples 20,000 are drawn, of several channels one, the
+brightest unless named. Residuals far beyond the others are drawn as triangles on the edge.
 """
 
 import math
@@ -37,7 +37,7 @@ _MARKERS = "osD^vP"
 
 
 def residuals(fit: "Fit", *, channel: str | int | None = None) -> "Figure":
-    """The figure of a fit's residuals by angle, in units of sigma or relative [1].
+    """The figure of a fit's residuals, model minus measurement, by angle, in units of sigma or relative [1].
 
     Raises UnknownNameError for a channel that does not exist.
     """
@@ -54,7 +54,7 @@ def residuals_of(material: "Material", samples: "Samples", *, channel: str | int
         samples = samples.subset(chosen.sort().values)
     with torch.no_grad():
         f = material.f(samples.wi, samples.wo)
-    left = samples.values[:, index] - f[:, min(index, f.shape[1] - 1)]
+    left = f[:, min(index, f.shape[1] - 1)] - samples.values[:, index]
     if samples.sigma is not None:
         residual = left / samples.sigma[:, index]
     else:
@@ -120,8 +120,8 @@ def _draw(samples: "Samples", residual: Tensor, title: str, notes: list[str]) ->
         place.tick_params(labelsize=7.5)
         place.grid(color="0.88", linewidth=0.5, zorder=0)
         place.set_axisbelow(True)
-    what = "(data - model) / sigma" if samples.sigma is not None else "relative residual"
-    figure.supylabel(f"{what} [1]", fontsize=9)
+    unit = " sigma" if samples.sigma is not None else "\n(measurement + 1 % of its median)"
+    figure.supylabel(f"(model - measurement) /{unit} [1]", fontsize=9)
     labels = [label for label, _ in groups]
     handles = _handles(
         labels, median=bool(line[0]), band=samples.sigma is not None, beyond=bool((residual.abs() > reach).any())

@@ -20,7 +20,7 @@ from .materials import (
 )
 from .problems import FieldError, HealthView, Problem
 from .renders import EffectView, PlanView, RenderOutcome, RenderPage, RenderRequest, RenderSummary, RenderView
-from .results import CertificateView, ComparisonView, CostView, FitOutcome, Interval
+from .results import CertificateView, ComparisonView, CostView, FitOutcome, Interval, OptionsView
 from .tables import TableOutcome, TablePage, TableSummary, TableView
 
 __all__ = [
@@ -57,6 +57,7 @@ __all__ = [
     "JobView",
     "ModelList",
     "ModelView",
+    "OptionsView",
     "PlanView",
     "PresetView",
     "Problem",

@@ -12,7 +12,8 @@ class ModelView(View):
     """A model of the registry, as its own file describes it."""
 
     name: str
-    summary: str
+    good_for: str = Field(description="one sentence for a choice: surfaces that it suits, and where it does not")
+    summary: str = Field(description="one sentence: which lobe or diffuse term it is")
     text: str = Field(description="formula, symbols and source")
     options: list[list[str]] = Field(description="groups of words; the first of a group is the default")
     parameters: list[dict[str, Any]]

@@ -69,6 +69,17 @@ class RungView(View):
     reason: str
 
 
+class OptionsView(View):
+    """What a fit was asked beside model, loss, seed and which values are fixed, gray or one a channel."""
+
+    bounds: dict[str, tuple[float, float]]
+    starts: list[dict[str, float | list[float]]] = Field(description="every value of each start that was given")
+    robust: str | None
+    robust_scale: float | None = Field(description="that was used: in the residual's unit, in sigma where weighed")
+    max_theta_deg: float | None
+    conserve_energy: bool
+
+
 class FitOutcome(View):
     """A finished fit, exactly as `Fit.to_dict()` gives it; null where there is no finite number."""
 
@@ -76,6 +87,8 @@ class FitOutcome(View):
     material_text: str
     material: dict[str, Any]
     loss: str
+    weighed: bool | None = Field(None, description="whether the samples' sigma weighed the loss")
+    options: OptionsView | None = None
     objective: float | None
     status: FitStatus = Field(description="undetermined: converged, but the data leave some values free")
     message: str

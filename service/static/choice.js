@@ -35,7 +35,7 @@ export async function install() {
   const diffuse = state.models.filter((model) => isDiffuse(model) && !named(model, "f0"));
   lobes.sort((a, b) => Number(FIRST.includes(b.name)) - Number(FIRST.includes(a.name)));
   at("lobes").append(...lobes.map(entry));
-  at("diffuse").append(...diffuse.map(({ name }) => made("option", { value: name }, name)), made("option", { value: "" }, "none"));
+  at("diffuse").append(...diffuse.map(({ name, good_for }) => made("option", { value: name }, `${name}: ${good_for}`)), made("option", { value: "" }, "none"));
   recall();
   ready();
 }
@@ -46,9 +46,9 @@ function named(model, parameter) {
 }
 
 /** @param {any} model */
-function entry({ name, summary }) {
+function entry({ name, good_for: line }) {
   const box = made("input", { type: "checkbox", name: "lobe", value: name });
-  return made("label", { class: "model" }, box, made("span", {}, made("b", {}, name), made("span", {}, summary)));
+  return made("label", { class: "model" }, box, made("span", {}, made("b", {}, name), made("span", {}, line)));
 }
 
 /** @returns {any[]} the controls that say what is fitted */

@@ -50,7 +50,7 @@ export async function drawResiduals(f) {
     hovertemplate: "viewer %{x:.1f}°, light %{text}°: %{y:.2f} %<extra></extra>",
   }], {
     xaxis: { title: { text: "viewer, positive on the mirror's side [°]" }, range: [-92, 92], dtick: 30 },
-    yaxis: { title: { text: "difference [% of their mean]" } },
+    yaxis: { title: { text: "model - measurement [% of their mean]" } },
   });
   at("residuals-title").textContent = "Model less measurement, by angle"
     + (samples.stride * step > 1 ? ` (one in ${samples.stride * step} samples)` : "");

@@ -54,8 +54,9 @@ function measure({ chi_square }) {
 }
 
 /** @param {any} result */
-function minimised({ loss, chi_square }) {
-  return chi_square ? `the ${loss} loss with every sample weighted by its stated error` : `the ${loss} loss`;
+function minimised({ loss, chi_square, weighed, options }) {
+  const form = options?.robust ? `, made robust by ${options.robust}` : "";
+  return `the ${loss} loss${(weighed ?? chi_square) ? " with every sample weighted by its stated error" : ""}${form}`;
 }
 
 /** @param {import("./state.js").Fit} fit @param {number} rank from 0, which is the colour of its curves */

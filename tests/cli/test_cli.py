@@ -108,6 +108,36 @@ def test_fit_by_a_service_is_the_same(run: Run, tmp_path: pathlib.Path) -> None:
     assert "Is it running?" in gone.stderr
 
 
+def test_fit_says_what_is_foretold_and_what_to_measure(run: Run, tmp_path: pathlib.Path) -> None:
+    """Of the material that it was given, and of one that it chose, whose keywords are its own."""
+    samples = bc.read(DATA)
+    starts = ["--starts", "ward_bounded.a=0.02 ward_bounded.rs=0.1", "--starts", "ward_bounded.a=0.5"]
+    done = run("fit", DATA, "--model", MODEL, *starts, "--held-out", "--next", "2", "--json")
+    result, held = json.loads(done.stdout), bc.held_out(samples, MODEL)
+    assert result["cost"]["starts"] == bc.fit(samples, MODEL).cost.starts + 2
+    assert result["held_out"]["error"] == pytest.approx(held.error, rel=1e-6)
+    assert len(result["next_directions"]["directions"]) == 2
+    rows = "".join(f"{t},0,{o},180,{0.06 + 1e-4 * (o % 7)}\n" for t in range(10, 70, 10) for o in range(0, 70, 5))
+    (tmp_path / "matte.csv").write_text("theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,value\n" + rows)
+    asked = ["--quantity", "brdf", "--fixed", "ggx.ks=0.2", "--held-out", "--next", "2"]
+    done = run("fit", tmp_path / "matte.csv", "--model", "auto", *asked)
+    assert done.returncode == 0, done.stderr
+    matte = bc.read(tmp_path / "matte.csv", quantity="brdf")
+    _, foretold, proposed = done.stdout.strip().split("\n\n")[-3:]
+    held = bc.held_out(matte, "lambert")
+    assert foretold.splitlines()[1:] == str(held).splitlines()[1:]
+    assert foretold.startswith(f"held out: error {held.error:.5g}, and {held.fitted:.5g} where fitted")
+    assert [line.split()[0] for line in foretold.splitlines()[2:]] == ["10", "20", "30", "40", "50", "60"]
+    assert proposed == str(bc.next_directions(bc.fit(matte, "lambert"), 2))
+    assert proposed.splitlines()[-1].split()[0] == "lambert.kd"
+
+
+def test_a_channel_that_is_not_there_is_refused_before_the_fit(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bc, "fit", lambda *_, **__: pytest.fail("the fit was made"))
+    done = run("fit", DATA, "--model", "lambert", "--channel", "nope", "--residuals", "r.svg")
+    assert done.stderr.startswith("brdf: Expected a channel to be a known name, got 'nope'.")
+
+
 MISTAKES = {
     "no file": (("fit", "absent.csv", "--model", "lambert"), "absent.csv"),
     "unknown model": (("fit", DATA, "--model", "lambrt"), "Did you mean 'lambert'"),
@@ -120,6 +150,23 @@ MISTAKES = {
     "plot folder": (("fit", DATA, "--model", "lambert", "--plot", "nosuch/x.svg"), "folder to exist"),
     "demo's plot": (("demo", "--plot", "d.pdf"), ".svg or .png"),
     "seed": (("fit", DATA, "--model", "lambert", "--seed", "-1"), "seed"),
+    "degrees": (("fit", DATA, "--model", "lambert", "--max-theta-deg", "95"), "in (0, 90] degrees, got 95."),
+    "no degrees": (("compare", DATA, "--max-theta-deg", "nan"), "in (0, 90] degrees, got nan."),
+    "fixed twice": (
+        ("fit", DATA, "--model", "lambert", "--fixed", "lambert.kd=0.1", "--fixed", "lambert.kd=0.2"),
+        "--fixed to name lambert.kd once",
+    ),
+    "bounds twice": (
+        ("compare", DATA, "--bounds", "lambert.kd=0.1:0.2", "--bounds", "lambert.kd=0.2:0.3"),
+        "--bounds to name lambert.kd once",
+    ),
+    "starts": (("fit", DATA, "--model", "lambert", "--starts", "0.2"), "--starts to be KEY=NUMBER, got '0.2'"),
+    "channels": (("fit", DATA, "--model", "lambert", "--fixed", "lambert.kd=0.1,0.2"), "1 channels as the data has"),
+    "no directions": (("fit", DATA, "--model", "lambert", "--next", "0"), "count to be a whole number from 1 on"),
+    "next by a service": (
+        ("fit", DATA, "--model", "lambert", "--next", "2", "--server", "http://127.0.0.1:9"),
+        "Expected --next to go without --server",
+    ),
     "data folder": (("serve", "--data", "/dev/null/x"), "/dev/null"),
     "undeclared": (("fit", DATA, "--model", "lambert", "--quantity", "brdf_cos"), "quantity"),
     "models": (("models", "krt"), "Did you mean 'kurt'"),

@@ -1,6 +1,7 @@
 """`brdf compare` as it is typed."""
 
 import json
+import math
 import pathlib
 import sys
 
@@ -44,6 +45,32 @@ def test_json_is_the_librarys_result(monkeypatch: pytest.MonkeyPatch, capsys: py
         assert {k: mine[k] for k in ("rank", "model", "errors", "objective", "parameters")} == {
             k: other[k] for k in ("rank", "model", "errors", "objective", "parameters")
         }
+
+
+def test_its_options_are_those_of_fit(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    given = [
+        *("--optimizer", "least_squares", "--per-channel", "kurt.f0", "--bounds", "lambert.kd=0.1:0.3"),
+        *("--starts", "kurt.m=0.1", "--robust", "cauchy", "--robust-scale", "0.5", "--max-theta-deg", "70"),
+    ]
+    assert typed(monkeypatch, str(DATA), "--models", "lambert + kurt", *given, "--conserve-energy", "--json") == 0
+    (row,) = json.loads(capsys.readouterr().out)["ranking"]
+    ours = bc.fit(
+        bc.read(DATA),
+        "lambert + kurt",
+        optimizer="least_squares",
+        per_channel=["kurt.f0"],
+        bounds={"lambert.kd": (0.1, 0.3)},
+        starts=[{"kurt.m": 0.1}],
+        robust="cauchy",
+        robust_scale=0.5,
+        max_theta=math.radians(70),
+        conserve_energy=True,
+    ).to_dict()
+    for name in ("parameters", "objective", "per_channel"):
+        assert row["fit"][name] == ours[name]
+    assert row["fit"]["conservation"] is not None
+    assert row["fit"]["data"]["masked"] == ours["data"]["masked"] != []
+    assert row["fit"]["cost"]["starts"] == ours["cost"]["starts"]
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ def test_a_model_is_printed_whole(name: str, capsys: pytest.CaptureFixture[str])
     facts = bc.MODELS[name].describe()
     assert printed.startswith(facts["text"])
     words = " ".join(printed[len(facts["text"]) :].split())
+    assert words.startswith(f"Good for: {facts['good_for']} ")
     assert all(word in words for group in facts["options"] for word in group)
     for p in facts["parameters"]:
         assert f" {p['name']} {p['box']} {p['default']:g} {p['per_channel']} " in words
@@ -35,4 +36,5 @@ def test_the_list_cuts_no_word_short(capsys: pytest.CaptureFixture[str]) -> None
     assert "…" not in printed
     for model in bc.MODELS.values():
         assert model.name in printed
+        assert all(word in printed for word in model.good_for.split())
         assert all(word in printed for group in model.option_groups for word in group)

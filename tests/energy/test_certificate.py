@@ -184,6 +184,7 @@ MAXIMA = [
     "lambert(kd=0.3) + lafortune(ks=0.4, cx=-1.1, cy=-1.1, n=20)",  # inside, isotropic
     "lafortune(ks=0.4, cx=-1.1, cy=0.3, n=20)",  # inside, along x
     "lafortune(ks=0.4, cx=0.5, cy=1.2, n=5) + ward_bounded(rs=0.3, ax=0.3, ay=0.05)",  # inside, along y
+    "ashikhmin_shirley(isotropic, constant, ks=0.7236, n=7.51)",  # between steps of the scan that differ
     "lambert(kd=[0.1, 0.5, 0.2]) + ggx(ks=[0.7, 0.1, 0.5], f0=0.9, a=0.4)",
     "ward_bounded(rs=0.5, ax=0.02, ay=0.3) + ashikhmin_shirley(f0=0.3, nu=1000, nv=5)",
 ]
@@ -342,6 +343,11 @@ VERDICTS = {
         "isotropic": False,
         "channel": 1,
         "channels": 3,
+    },
+    "Conserves energy: the largest albedo is 0.2, at normal incidence in channel 550 nm.": {
+        "channel": 1,
+        "channels": 2,
+        "channel_names": ("450 nm", "550 nm"),
     },
     "Not decided: the largest albedo is 0.999 to within 0.01, at normal incidence.": {
         "max_albedo": 0.999,

@@ -69,6 +69,32 @@ def test_weights_of_their_own_stay_their_own() -> None:
         alike(fit, bc.fit(samples, MODEL))
 
 
+def test_what_differs_beside_values_and_directions_stays_with_its_material() -> None:
+    """Names of channels, and whether sigma or a weight decides, are each material's own."""
+    first = measured_from("lambert(kd=[0.2, 0.1])", count=60, noise=0.01, sigma=True)
+
+    def made(**changed: object) -> bc.Samples:
+        kept = {"values": first.values, "sigma": first.sigma, **changed}
+        return bc.Samples(first.wi, first.wo, **kept)
+
+    weight = torch.linspace(0.1, 3, len(first), dtype=torch.float64)
+    several = [
+        made(channels=["red", "green"]),
+        made(channels=["400", "500"]),
+        made(weight=weight),
+        made(),
+        made(sigma=None, weight=weight),
+        made(sigma=None, cell=weight),
+        made(sigma=None),
+    ]
+    for samples, fit in zip(several, fit_batch(several, "lambert + ward_bounded(isotropic)", loss="l2"), strict=True):
+        alone = bc.fit(samples, "lambert + ward_bounded(isotropic)", loss="l2")
+        alike(fit, alone)
+        assert fit.covariance_keys == alone.covariance_keys
+        assert (fit.weighed, fit.chi_square is None) == (alone.weighed, alone.chi_square is None)
+        assert fit.channels == samples.channels
+
+
 def test_a_batch_costs_each_fit_its_share() -> None:
     several = [measured_from(TRUE, noise=0.02 * (i + 1)) for i in range(6)]
     seen: list[Progress] = []

@@ -70,4 +70,4 @@ def test_a_fit_imports_no_second_half_of_torch() -> None:
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=True)
     new = run.stdout.split()
     assert not [name for name in new if name.startswith(("torch._decomp", "torch.fx", "torch._functorch"))]
-    assert len(new) < 60
+    assert len(new) < 64

@@ -156,3 +156,11 @@ def test_a_batch_gives_what_each_gives_alone():
 def test_conserve_energy_is_a_truth_value():
     with pytest.raises(ParameterError, match=r"Expected conserve_energy to be true or false, got 'yes'\. Pass one of"):
         bc.fit(noisy("lambert(kd=0.2)"), "lambert", conserve_energy="yes")
+
+
+def test_the_verdict_names_the_datas_channel() -> None:
+    values = torch.tensor([[0.05, 0.1]] * 3)
+    samples = bc.Samples.from_angles(
+        [10, 30, 50], 0, [20, 40, 60], 180, values, "degrees", channels=("450 nm", "550 nm")
+    )
+    assert bc.fit(samples, "lambert").certificate.verdict.endswith(" at normal incidence in channel 550 nm.")

@@ -10,7 +10,9 @@ import torch
 from fit_cases import TRUE, directions, measured_from
 
 import brdfcore as bc
-from brdfcore.errors import SamplesError
+from brdfcore.errors import InvalidValueError, SamplesError
+from brdfcore.fitting import search
+from brdfcore.fitting.lbfgs import lbfgs
 from brdfcore.fitting.result import STATUSES
 
 MODELS = (
@@ -32,8 +34,8 @@ def one_incidence() -> bc.Samples:
 
 # the samples, and what a fit of a lobe to them must say
 CASES = {
-    "fewer samples than values": (bc.Samples(WI[:2], WO[:2], RANDOM[:2]), "2 samples of 1 channels, which are too few"),
-    "one sample": (bc.Samples(WI[:1], WO[:1], RANDOM[:1]), "1 samples of 1 channels, which are too few"),
+    "fewer samples than values": (bc.Samples(WI[:2], WO[:2], RANDOM[:2]), "2 samples of 1 channel, too few"),
+    "one sample": (bc.Samples(WI[:1], WO[:1], RANDOM[:1]), "1 sample of 1 channel, too few"),
     "all zero": (bc.Samples(WI, WO, 0 * RANDOM), "No value is positive"),
     "all negative": (bc.Samples(WI, WO, -RANDOM), "No value is positive"),
     "one direction": (bc.Samples(WI[:1].expand(30, 3), WO[:1].expand(30, 3), RANDOM), "share one pair of directions"),
@@ -87,9 +89,86 @@ def test_so_it_is_with_other_optimizers(case: str) -> None:
 
 
 def test_values_whose_squares_leave_the_type_are_refused() -> None:
+    extremes = bc.Samples(
+        WI, WO, torch.cat([RANDOM[:1], 1e-200 * RANDOM[1:]])
+    )  # the relative loss divides by small ones
     with pytest.raises(SamplesError, match=r"^Expected values to be of a size whose squares a double holds") as caught:
-        bc.fit(bc.Samples(WI, WO, 1e-200 * RANDOM), "lambert + kurt", loss="relative")
+        bc.fit(extremes, "lambert + kurt", loss="relative")
     assert caught.value.field == "values"
+
+
+EXTREME = {
+    "values": (
+        bc.Samples(WI, WO, 1e160 * RANDOM),
+        {},
+        "the largest of values from 1e-110 to 1e+110, got 9.41e+159. Choose",
+    ),
+    "small values": (bc.Samples(WI, WO, 1e-160 * RANDOM), {}, "got 9.41e-161. Choose another unit."),
+    "sigma": (
+        bc.Samples(WI, WO, RANDOM, sigma=RANDOM * 1e-200),
+        {},
+        "the largest of sigma from 1e-110 to 1e+110, got 9.41e-201.",
+    ),
+    "large sigma": (bc.Samples(WI, WO, RANDOM, sigma=RANDOM * 1e200), {}, "got 9.41e+199. Give sigma in the unit"),
+    "their ratio": (
+        bc.Samples(WI, WO, 1e70 * RANDOM, sigma=RANDOM * 1e-70),
+        {},
+        "the largest of values over sigma from 1e-110 to 1e+110, got 1e+140.",
+    ),
+    "weight": (bc.Samples(WI, WO, RANDOM, weight=1e200 * RANDOM[:, 0]), {}, "Divide all weights by the largest."),
+    "robust_scale": (
+        bc.Samples(WI, WO, RANDOM),
+        {"robust": "cauchy", "robust_scale": 1e-300},
+        "from 1e-10 to 1e+110 times what the largest value counts under the cosine loss, 0.",
+    ),
+    "large robust_scale": (bc.Samples(WI, WO, RANDOM), {"robust": "soft_l1", "robust_scale": 1e300}, "got 1e+300."),
+}
+
+
+@pytest.mark.parametrize("case", EXTREME)
+def test_what_is_of_no_size_is_named_before_any_work(case: str) -> None:
+    """In a batch too, so that one material of many does not lose what was done for the others."""
+    samples, keywords, part = EXTREME[case]
+    good, seen = bc.Samples(WO, WI, RANDOM), []
+    for call in (
+        lambda: bc.fit(samples, "lambert + ward_bounded", **keywords),
+        lambda: bc.fit_batch([good, samples], "lambert + ward_bounded", progress=seen.append, **keywords),
+    ):
+        with pytest.raises(InvalidValueError) as caught:
+            call()
+        assert str(caught.value).startswith(f"Expected {caught.value.field} to be ")
+        assert caught.value.field == case.split()[-1].replace("ratio", "sigma")
+        assert part in str(caught.value)
+    assert seen == []
+
+
+@pytest.mark.parametrize("model", ["lambert", "lambert + ward_bounded", "lambert + kurt"])
+def test_values_beyond_any_reflectance_are_told(model: str) -> None:
+    """In percent, or in counts; and not where a lobe alone is missing, or values are fixed."""
+    good = measured_from(TRUE, count=80, noise=0.01)
+
+    def told(factor: float, **keywords: object) -> bool:
+        samples = bc.Samples(good.wi, good.wo, factor * good.values)
+        return any("Check the unit and the quantity" in one for one in bc.fit(samples, model, **keywords).warnings)
+
+    assert [told(factor) for factor in (math.pi, 100, 1e8)] == [False, True, True]
+    form = bc.fit(good, model).form
+    assert not told(100, fixed=dict.fromkeys(form.parameters, 0.5))
+
+
+def test_what_stops_early_is_not_sent_to_what_it_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    samples = measured_from(TRUE, noise=0.01)
+    one_step = {"max_iterations": 1}
+    for name in ("least_squares", "variable_projection"):
+        stop = getattr(search, name)
+        monkeypatch.setattr(search, name, lambda *a, stop=stop, **k: stop(*a, **{**k, **one_step}))
+    for optimizer in ("auto", "least_squares"):
+        fit = bc.fit(samples, "lambert + kurt", optimizer=optimizer)
+        assert fit.status == "stopped_early"
+        assert "least_squares" not in fit.message
+        assert "give starts near it" in fit.message
+    monkeypatch.setitem(vars(search), "lbfgs", lambda *a, **k: lbfgs(*a, **{**k, "max_iterations": 1}))
+    assert "use least_squares" in bc.fit(samples, "lambert + kurt", optimizer="lbfgs").message
 
 
 @pytest.mark.parametrize(
@@ -122,9 +201,8 @@ def test_one_direction_determines_a_sum() -> None:
     assert "one by one, only together" in fit.message
     alone = bc.fit(CASES["one direction"][0], "lambert")
     assert alone.status == "converged"
-    assert float(alone.parameters["lambert.kd"]) == pytest.approx(math.pi * float(RANDOM.mean()), rel=1e-9) or float(
-        alone.parameters["lambert.kd"]
-    ) == pytest.approx(1)
+    assert float(RANDOM.mean()) > 1 / math.pi
+    assert float(alone.parameters["lambert.kd"]) == 1, "the mean of the values is above that of a white surface"
 
 
 @pytest.mark.parametrize("name", ["chassis", "solar_array"])

@@ -8,8 +8,12 @@ import torch
 from fit_cases import TRUE, directions, measured_from
 
 import brdfcore as bc
+from brdfcore.demo import DATA
 from brdfcore.errors import BrdfError
+from brdfcore.fitting import check
+from brdfcore.fitting.adam import adam
 from brdfcore.fitting.every_error import errors
+from brdfcore.fitting.problem import Problem
 from brdfcore.fitting.result import STATUSES
 
 MODEL = "lambert + ward_bounded(isotropic)"
@@ -41,6 +45,27 @@ def test_every_optimizer_reaches_the_same_optimum(optimizer: str) -> None:
     assert fit.status == "converged"
     assert fit.objective == pytest.approx(best, rel=1e-8)
     assert fit.cost.optimizer == ("variable_projection" if optimizer == "auto" else optimizer)
+
+
+BENT = "lambert(kd=0.1) + kurt(anisotropic, ks=0.4, f0=0.2, mx=0.15, my=0.3, alpha=0.25)"
+
+
+@pytest.mark.parametrize("data", ["measured", pytest.param("bent", marks=pytest.mark.full)])
+@pytest.mark.parametrize("optimizer", ["lbfgs", "adam"])
+def test_gradient_methods_get_through_bent_valleys(optimizer: str, data: str) -> None:
+    """Where ks f0 is known better than either, the way along it is long; real data, and a material of six shapes."""
+    samples = bc.read(DATA) if data == "measured" else measured_from(BENT, noise=0.01)
+    fit = bc.fit(samples, "lambert + kurt", optimizer=optimizer)
+    assert fit.status != "stopped_early"
+    assert fit.objective == pytest.approx(bc.fit(samples, "lambert + kurt").objective, rel=1e-7)
+    assert fit.cost.evaluations < 5000
+
+
+def test_adam_without_the_steps_that_it_needs_stops_early() -> None:
+    problem = Problem(check(1, "lambert + kurt"), bc.read(DATA), bc.LOSSES["cosine"])
+    ended = adam(problem, problem.pack(problem.plan.start).unsqueeze(0), max_iterations=30)
+    assert ended.iterations == 30
+    assert not bool(ended.converged)
 
 
 MATERIALS = {
@@ -184,7 +209,7 @@ def test_result_is_json_and_names_what_made_it() -> None:
     assert result["cost"]["seconds"] > 0
     assert result["cost"]["starts"] > 1
     assert "lambert.kd[r]" in result["report"]
-    assert result["report"] == fit.report() or fit.report().splitlines()[:3] == result["report"].splitlines()[:3]
+    assert result["report"] == fit.report()
 
 
 def test_progress_rises_to_one(three_channels: bc.Samples) -> None:
@@ -223,8 +248,8 @@ def test_bounds_hold_and_starts_lead_to_their_optimum() -> None:
     samples = measured_from("lambert(kd=0.1) + ward_bounded(isotropic, rs=0.1, a=0.3)", noise=0.01)
     for loss in bc.LOSSES:
         fit = bc.fit(samples, MODEL, loss=loss, bounds={"ward_bounded.a": (0.01, 0.2), "lambert.kd": (0.15, 1.0)})
-        assert 0.01 <= float(fit.parameters["ward_bounded.a"]) <= 0.2 * (1 + 1e-15)
-        assert float(fit.parameters["lambert.kd"]) >= 0.15
+        assert 0.01 <= float(fit.values["ward_bounded.a"]) <= 0.2 * (1 + 1e-15)
+        assert float(fit.values["lambert.kd"]) >= 0.15
     free = bc.fit(samples, MODEL)
     assert bc.fit(samples, MODEL, starts=[{"ward_bounded.a": 5.0}]).objective == pytest.approx(free.objective, rel=1e-9)
     assert bc.fit(samples, MODEL, starts=[{}]).cost.starts == free.cost.starts + 1

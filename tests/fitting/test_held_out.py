@@ -125,6 +125,43 @@ def test_refusals() -> None:
     assert caught.value.field == "samples"
 
 
+def test_a_block_without_weight_has_no_error() -> None:
+    incidences = [10.0, 20.0, 35.0, 50.0, 60.0, 70.0]
+    samples = goniometer(incidences)
+    theta = torch.rad2deg(torch.acos(samples.wi[:, 2]))
+    weight = (theta < 65).double()
+    found = bc.held_out(bc.Samples(samples.wi, samples.wo, samples.values, weight=weight), MODEL, folds=3)
+    without = [one for one in found.incidences if round(math.degrees(one.theta)) == 70]
+    assert [math.isnan(one.error) for one in without] == [True]
+    assert all(one.error > 0 for one in found.incidences if one not in without)
+    data = found.to_dict()
+    assert [one["error"] for one in data["incidences"]].count(None) == 1
+    assert data["error"] == found.error
+    json.dumps(data, allow_nan=False)
+
+
+def test_folds_conserve_energy_where_that_is_asked_for() -> None:
+    """Each fold by hand, of data whose free fit does not; and what is fitted is the fit that does."""
+    samples = goniometer([10.0, 20.0, 35.0, 50.0, 60.0, 70.0])
+    samples = bc.Samples(samples.wi, samples.wo, 4.5 * samples.values)
+    seen: list[bc.Progress] = []
+    found = bc.held_out(samples, MODEL, folds=2, seed=2, conserve_energy=True, progress=seen.append)
+    whole = bc.fit(samples, MODEL, conserve_energy=True)
+    assert whole.conservation is not None
+    assert whole.conservation.free_max_albedo > 1
+    assert found.fitted == pytest.approx(math.sqrt(whole.objective / len(samples)), rel=1e-9)
+    fold = dealt(blocks(samples, 2), samples, 2, 2)
+    for number in range(2):
+        fit, rest = bc.fit(samples.subset(fold != number), MODEL, conserve_energy=True), samples.subset(fold == number)
+        with torch.no_grad():
+            own = (rest.wi[:, 2:] * (fit.material.f(rest.wi, rest.wo) - rest.values)).square().mean().sqrt()
+        assert found.folds[number] == pytest.approx(float(own), rel=1e-6)
+    assert found.error != pytest.approx(bc.held_out(samples, MODEL, folds=2, seed=2).error, rel=1e-3)
+    fractions = [p.fraction for p in seen]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1
+
+
 def test_the_typical_error_is_a_geometric_mean_that_no_block_decides() -> None:
     """Blocks of root mean squares 1 and 4, alike in samples, make 2; a block counts as its samples do."""
     block = torch.tensor([0, 0, 1, 1])
@@ -134,5 +171,9 @@ def test_the_typical_error_is_a_geometric_mean_that_no_block_decides() -> None:
     more = torch.cat([squares, torch.tensor([3e6, 0.0, 0.0]).double()])
     found = typical(more, torch.ones(7, dtype=torch.float64), torch.tensor([0, 0, 1, 1, 2, 2, 2]), 0.0)
     assert found == pytest.approx(4 ** (2 / 7) * 1000 ** (3 / 7))
+    half = torch.tensor([1, 1, 1, 0, 0, 0]).double()  # a block without weight, and a sample without
+    assert typical(torch.cat([squares[:3], half[3:]]), half, torch.tensor([0, 0, 1, 1, 2, 2]), 0.0) == pytest.approx(
+        10 ** (1 / 6)
+    )
     assert typical(torch.zeros(4).double(), weights, block, 0.0) == 0
     assert typical(0 * squares + torch.tensor([2.0, 0, 0, 0]), weights, block, 0.25) == pytest.approx(0.5)

@@ -47,6 +47,20 @@ def steep_less(text: str, limit: float, seed: int = 1) -> bc.Samples:
     return noisy(text, from_angles(theta, 0 * theta), from_angles(theta_o, phi_o), 0.02, seed)
 
 
+def test_bounds_within_the_noise_leave_a_value_undetermined() -> None:
+    """Bounds of twice the interval's length without bounds leave something to tell, those of a third do not."""
+    samples = measured_from("lambert(kd=0.2)", count=100, noise=0.002)
+    low, high = bc.fit(samples, "lambert").intervals["lambert.kd"].tolist()
+    length, middle = high - low, (high + low) / 2
+
+    def within(share: float) -> bc.Fit:
+        half = share * length / 2
+        return bc.fit(samples, "lambert", bounds={"lambert.kd": (middle - half, middle + half)})
+
+    assert within(2).undetermined == ()
+    assert within(0.3).undetermined == ("lambert.kd",)
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_an_anisotropic_lobe_on_isotropic_data_is_determined_only_together(noise: float) -> None:
     """Ward's lobe over the x-z plane of half vectors is a function of ax and of rs/ay: one direction is free."""

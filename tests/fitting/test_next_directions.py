@@ -5,6 +5,7 @@ import math
 
 import pytest
 import torch
+from fit_cases import measured_from
 from generated_materials import geometry, of
 
 import brdfcore as bc
@@ -13,6 +14,7 @@ from brdfcore.fitting.next_directions import reachable
 
 KURT = "lambert(kd=0.2) + kurt(isotropic, ks=0.5, f0=0.3, m=0.2, alpha=0.1)"
 FIXED = "lambert + kurt(isotropic)"
+WARD = "lambert + ward_bounded(isotropic)"
 
 
 def within(where: bc.Samples, degrees: float) -> bc.Samples:
@@ -52,6 +54,15 @@ def test_the_predicted_shrinkage_is_that_of_refits(sigma: bool) -> None:
     for key, predicted in next_.shrinkage.items():
         assert float(new[key] / old[key]) == pytest.approx(float(predicted), rel=0.3), key
     assert min(float(s) for s in next_.shrinkage.values()) < 0.8
+
+
+@pytest.mark.parametrize("loss", ["cosine", "log"])
+def test_no_value_becomes_less_sure(loss: str) -> None:
+    """Noise that grows with the value, under losses that do not weigh so: near grazing it would blur what is known."""
+    fit = bc.fit(measured(KURT, within(geometry(turned=False), 75), 0, share=0.1), FIXED, loss=loss)
+    next_ = bc.next_directions(fit, 6)
+    assert max(float(s.max()) for s in next_.shrinkage.values()) <= 1 + 1e-9
+    assert next_.information > 0.1
 
 
 def information(fit: bc.Fit, wi: torch.Tensor, wo: torch.Tensor, share: float) -> torch.Tensor:
@@ -150,3 +161,32 @@ def test_refusals() -> None:
     with pytest.raises(ParameterError, match=r"^Expected fit to have a free value") as caught:
         bc.next_directions(bc.fit(samples, "lambert", fixed={"lambert.kd": 0.2}), 3)
     assert caught.value.field == "fit"
+
+
+def test_a_users_box_is_what_is_known_beforehand() -> None:
+    """A width that the samples leave free: what more of them tell is little beside a box that is narrow already."""
+    angles = torch.arange(0, 80, 5.0)
+    where = bc.Samples.from_angles(60.0, 0.0, angles, 0.0, torch.ones(16), unit="degrees")
+    samples = measured("lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.05)", where, 0)
+    shares = []
+    for bounds in ({}, {"ward_bounded.a": (0.0499, 0.0501)}):
+        fit = bc.fit(samples, "lambert + ward_bounded(isotropic, a=0.05)", bounds=bounds)
+        shares.append(float(bc.next_directions(fit, 3).shrinkage["ward_bounded.a"]))
+    assert shares[0] < 0.8
+    assert shares[1] > 0.99
+
+
+def test_outliers_that_a_robust_form_sees_do_not_decide() -> None:
+    """What is gained is that of a fit to the good samples, not what the bad ones make of it."""
+    good, model = measured_from("lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.15)", noise=0.003), WARD
+    values = good.values.clone()
+    values[::10] *= 5
+    bad = bc.Samples(good.wi, good.wo, values)
+    clean = torch.ones(len(good), dtype=torch.bool)
+    clean[::10] = False
+    robust = bc.fit(bad, model, robust="cauchy", robust_scale=0.007)
+    assert robust.robust_scale == 0.007
+    fits = bc.fit(good.subset(clean), model), robust, bc.fit(bad, model)
+    of_good, of_robust, of_plain = (bc.next_directions(fit, 8).information for fit in fits)
+    assert of_robust == pytest.approx(of_good, rel=0.2)
+    assert of_plain < 0.5 * of_good

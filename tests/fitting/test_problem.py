@@ -57,6 +57,9 @@ def test_normal_equations_are_the_jacobians(samples: bc.Samples, case: str, loss
     residuals = defined(x)
     full = torch.autograd.functional.jacobian(defined, x)
     gram = problem.gram(x.unsqueeze(0))
+    total, gradient = problem.gradient(x.unsqueeze(0))
+    torch.testing.assert_close(total, gram.loss, rtol=1e-12, atol=0)
+    torch.testing.assert_close(gradient, gram.gradient, rtol=1e-10, atol=1e-12)
     assert float(gram.loss) == pytest.approx(float(residuals.square().sum()), rel=1e-13)
     torch.testing.assert_close(gram.matrix[0], full.T @ full, rtol=1e-10, atol=1e-12)
     torch.testing.assert_close(gram.gradient[0], full.T @ residuals.reshape(-1), rtol=1e-10, atol=1e-12)
@@ -103,3 +106,14 @@ def test_sigma_makes_the_cosine_loss_chi_square() -> None:
     x = torch.tensor([[0.15]], dtype=torch.float64)
     expected = (((0.15 / torch.pi - samples.values) / samples.sigma) ** 2).sum()
     assert float(problem.loss(x)) == pytest.approx(float(expected), rel=1e-12)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_gradients_are_those_of_each_rows_own_material(samples: bc.Samples, channels: int) -> None:
+    several = [bc.Samples(samples.wi, samples.wo, k * samples.values[:, :channels]) for k in (1.0, 0.5)]
+    made = plan(channels, "lambert + kurt(isotropic)", azimuth_observed=True)
+    problem = Problem(made, several, LOSSES["log"])
+    x, which = torch.stack([inside(problem, seed) for seed in range(3)]), torch.tensor([1, 0, 1])
+    gram, (loss, gradient) = problem.gram(x, which), problem.gradient(x, which)
+    torch.testing.assert_close(loss, gram.loss, rtol=1e-12, atol=0)
+    torch.testing.assert_close(gradient, gram.gradient, rtol=1e-10, atol=1e-12)

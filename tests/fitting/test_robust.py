@@ -1,5 +1,6 @@
 """Robust forms: their equations, their derivatives, and what they are for."""
 
+import json
 import math
 
 import pytest
@@ -74,6 +75,53 @@ def test_a_few_bad_samples_do_not_decide(name: str, loss: str) -> None:
 
 
 @pytest.mark.parametrize("name", ROBUST)
+def test_a_fifth_of_gross_outliers_does_not_decide(name: str) -> None:
+    """They inflate the spread about the plain optimum tenfold and more: one turn of spread and fit is not enough."""
+    good = measured_from(TRUE, noise=0.003)
+    values = good.values.clone()
+    values[::5] *= 10
+    fit = bc.fit(bc.Samples(good.wi, good.wo, values), MODEL, robust=name)
+    for key, value in bc.material(TRUE).values().items():
+        off = {"soft_l1": 0.12, "cauchy": 0.03}[name]
+        assert float(fit.parameters[key]) == pytest.approx(float(value.detach()), rel=off), key
+
+
+def test_the_scale_is_that_of_the_residuals_where_the_fit_ends() -> None:
+    samples = spoiled()
+    fit = bc.fit(samples, MODEL, robust="cauchy")
+    r = samples.wi[:, 2:] * (fit.material.f(samples.wi, samples.wo).detach() - samples.values)
+    scale = ROBUST["cauchy"].multiple * 1.4826 * float(r.abs().median())
+    again = bc.fit(samples, MODEL, robust="cauchy", robust_scale=scale)
+    assert fit.objective == pytest.approx(again.objective, rel=0.01)
+
+
+def test_samples_of_weight_0_do_not_make_the_scale() -> None:
+    """Most samples without weight, far off: the fit is that to the others alone."""
+    good = spoiled()
+    values, weight = good.values.clone(), torch.zeros(len(good))
+    weight[:60] = 1
+    values[60:] = 3
+    whole = bc.fit(bc.Samples(good.wi, good.wo, values, weight=weight), MODEL, robust="cauchy")
+    alone = bc.fit(good.subset(torch.arange(60)), MODEL, robust="cauchy")
+    assert whole.objective == pytest.approx(alone.objective, rel=1e-6)
+    for key, value in alone.parameters.items():
+        torch.testing.assert_close(whole.parameters[key], value, rtol=1e-6, atol=0)
+
+
+@pytest.mark.parametrize("name", ROBUST)
+def test_a_sample_of_weight_2_is_one_that_is_there_twice(name: str) -> None:
+    samples = spoiled()
+    twice = torch.arange(len(samples)) % 3 == 0
+    weight = 1 + twice.double()
+    more = torch.cat([torch.arange(len(samples)), twice.nonzero()[:, 0]])
+    weighted = bc.fit(bc.Samples(samples.wi, samples.wo, samples.values, weight=weight), MODEL, robust=name)
+    repeated = bc.fit(samples.subset(more), MODEL, robust=name)
+    assert weighted.objective == pytest.approx(repeated.objective, rel=1e-9)
+    for key, value in repeated.parameters.items():
+        torch.testing.assert_close(weighted.parameters[key], value, rtol=1e-6, atol=0)
+
+
+@pytest.mark.parametrize("name", ROBUST)
 def test_the_optimum_is_scipys_with_the_same_scale(name: str) -> None:
     samples, scale = spoiled(), 0.004
     fit = bc.fit(samples, MODEL, robust=name, robust_scale=scale)
@@ -104,3 +152,82 @@ def test_intervals_of_a_robust_fit_are_those_of_the_good_samples() -> None:
 def test_exact_data_are_fitted_exactly() -> None:
     fit = bc.fit(measured_from(TRUE), MODEL, robust="cauchy")
     assert float(fit.parameters["ward_bounded.a"]) == pytest.approx(0.15, rel=1e-6)
+
+
+def test_models_are_compared_at_one_scale() -> None:
+    """That of the model that fits best, whose residuals are the smallest."""
+    samples = spoiled()
+    models = ["lambert", "lambert + blinn_phong", MODEL]
+    compared = bc.compare(samples, models, robust="cauchy")
+    assert compared.models[0] == MODEL
+    assert len({fit.robust_scale for fit in compared.fits}) == 1
+    assert compared.fits[0].robust_scale == pytest.approx(
+        bc.fit(samples, MODEL, robust="cauchy").robust_scale, rel=0.02
+    )
+    given = bc.compare(samples, models, robust="cauchy", robust_scale=0.2)
+    assert {fit.robust_scale for fit in given.fits} == {0.2}
+
+
+def test_the_materials_of_a_ladder_are_compared_at_one_scale() -> None:
+    samples = spoiled()
+    fit = bc.fit(samples, ["lambert", MODEL], robust="cauchy")
+    assert fit.model == bc.material(MODEL).form.text()
+    own = bc.fit(samples, MODEL, robust="cauchy").robust_scale
+    assert fit.robust_scale == pytest.approx(own, rel=0.02)
+    lambert = bc.fit(samples, "lambert", robust="cauchy", robust_scale=fit.robust_scale)
+    assert fit.ladder[0].error == pytest.approx(math.sqrt(lambert.objective / len(samples)), rel=1e-6)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("noise", [0.003, 0.0])
+def test_auto_sees_past_outliers(noise: float) -> None:
+    """A fifth reads ten times too high; without noise, a shape that fits exactly must not make all others outliers."""
+    good = measured_from(TRUE, noise=noise)
+    values = good.values.clone()
+    values[::5] *= 10 if noise else 1
+    fit = bc.fit(bc.Samples(good.wi, good.wo, values), "auto", robust="cauchy")
+    assert set(fit.parameters) >= {"lambert.kd"}
+    assert len(fit.parameters) > 1
+    assert float(fit.parameters["lambert.kd"]) == pytest.approx(0.2, rel=0.08)
+
+
+def test_energy_is_conserved_at_the_scale_of_the_free_fit() -> None:
+    samples = measured_from("lambert(kd=0.1) + kurt(isotropic, ks=0.5, f0=0.3, m=0.2, alpha=0.3)", noise=0.003)
+    free = bc.fit(samples, "lambert + kurt(isotropic)", robust="cauchy")
+    kept = bc.fit(samples, "lambert + kurt(isotropic)", robust="cauchy", conserve_energy=True)
+    assert kept.conservation.fixed == ("kurt.alpha",)
+    assert kept.robust_scale == free.robust_scale
+    assert kept.conservation.free_objective == free.objective < kept.objective
+
+
+def test_a_result_says_what_it_was_asked() -> None:
+    good = measured_from(TRUE, noise=0.003, sigma=True)
+    fit = bc.fit(
+        good,
+        MODEL,
+        robust="cauchy",
+        bounds={"ward_bounded.a": (0.1, 0.3)},
+        starts=[{"ward_bounded.a": 0.2}],
+        max_theta=math.radians(70),
+    )
+    options = json.loads(json.dumps(fit.to_dict(), allow_nan=False))["options"]
+    assert options.pop("starts")[0]["ward_bounded.a"] == 0.2
+    assert options == {
+        "bounds": {"ward_bounded.a": [0.1, 0.3]},
+        "robust": "cauchy",
+        "robust_scale": fit.robust_scale,
+        "max_theta_deg": pytest.approx(70),
+        "conserve_energy": False,
+    }
+    assert 2 < fit.robust_scale < 3  # in sigma: 2.38 times a spread of one
+    report = fit.report().splitlines()
+    assert f"robust: cauchy, residuals beyond {fit.robust_scale:.4g} sigma count less" in report
+    assert "bounds: ward_bounded.a [0.1, 0.3]" in report
+    assert "starts given: 1" in report
+    assert "directions up to 70 degrees" in report
+    assert fit.weighed
+    assert "Residuals were counted in sigma and made cauchy, so the minimised loss is not chi-square." in fit.message
+    assert "the minimised loss is chi-square" not in fit.message
+    plain = bc.fit(good, MODEL)
+    assert plain.robust_scale is None
+    assert "robust" not in plain.report()

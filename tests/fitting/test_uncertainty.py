@@ -171,6 +171,16 @@ def test_chi_square_is_reported_where_sigma_is_known() -> None:
     assert bc.fit(measured_from(TRUE), "lambert").chi_square is None
 
 
+def test_chi_square_and_its_degrees_of_freedom_count_the_same_samples() -> None:
+    good = bc.read(DATA)
+    weight, values = torch.ones(len(good)), good.values.clone()
+    weight[::2], values[::2] = 0, 1
+    half = bc.fit(bc.Samples(good.wi, good.wo, values, sigma=good.sigma, weight=weight), MODEL)
+    value, freedom = half.chi_square
+    assert freedom == 109
+    assert 0.6 < value / freedom < 1.5
+
+
 def test_a_wrong_weighting_is_paid_for() -> None:
     """With sigma known, a weight that ignores it still gives honest, wider intervals."""
     best = linoleum()

@@ -49,6 +49,15 @@ def test_the_docstring_states_the_traits_and_options(name):
 
 
 @every_model
+def test_what_a_model_is_good_for_is_one_short_sentence_of_its_own(name):
+    """Its own file says it, in plain words: no formula, no name of the paper."""
+    line = vars(bc.MODELS[name])["good_for"]
+    assert re.fullmatch(r"[A-Z][a-z0-9 ,:;-]+\.", line)
+    assert len(line) <= 90
+    assert [other.name for other in bc.MODELS.values() if other.good_for == line] == [name]
+
+
+@every_model
 def test_descriptions_are_what_the_choices_declare(name):
     """`where` names, of each group of options, the words under which a parameter is declared so; none where always."""
     model = bc.MODELS[name]

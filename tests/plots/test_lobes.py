@@ -70,6 +70,12 @@ def test_a_turned_sample_shows_one_azimuth() -> None:
     assert any("azimuth 0°" in text.get_text() for text in figure.texts)
 
 
+@pytest.mark.parametrize("scale", SCALES)
+def test_the_caption_names_the_unit_of_the_rings(scale: str) -> None:
+    (_, caption) = bc.plots.lobes(bc.material(MATERIAL), scale=scale).texts
+    assert "rings: f [1/sr]" in caption.get_text()
+
+
 def test_channel_is_named(linoleum: bc.Samples) -> None:
     colours = bc.Samples(linoleum.wi, linoleum.wo, linoleum.values.expand(-1, 3) * torch.tensor([1.0, 3.0, 2.0]))
     material = bc.material("lambert(kd=[0.1, 0.3, 0.2])")
@@ -89,11 +95,29 @@ def test_files_open_and_are_reproducible(tmp_path: pathlib.Path, linoleum: bc.Sa
     assert bc.plots.to_bytes(figure, "png").startswith(b"\x89PNG")
 
 
-def test_texts_do_not_overlap_and_stay_inside(linoleum: bc.Samples) -> None:
-    """Title, caption and panel titles are apart from each other and within the figure."""
-    figure = bc.plots.lobes(bc.material(" + ".join(["lambert"] + ["ward_bounded"] * 4)), linoleum)
-    renderer = FigureCanvasAgg(figure).get_renderer()
-    boxes = [text.get_window_extent(renderer) for text in [*figure.texts, *(axes.title for axes in figure.axes)]]
+def turned(linoleum: bc.Samples) -> bc.Samples:
+    """The samples in three channels, one of a long name, at an azimuth that was observed."""
+    values = linoleum.values.expand(-1, 3) * torch.tensor([1.0, 3.0, 2.0])
+    names = ("650 nm", "a broad band about 550 nm", "450 nm")
+    return bc.Samples(linoleum.wi, linoleum.wo, values, channels=names, azimuth_observed=True)
+
+
+@pytest.mark.parametrize(
+    ("theta_i_deg", "scale"), [(None, "linear"), ([45], "cube_root"), ([45], "log"), ([45, 55], "linear")]
+)
+def test_texts_do_not_overlap_and_stay_inside(
+    linoleum: bc.Samples, theta_i_deg: list[float] | None, scale: str
+) -> None:
+    """Title, caption, and the titles and ring labels of panels are apart from each other and within the figure."""
+    samples = linoleum if theta_i_deg is None else turned(linoleum)
+    material = bc.material(" + ".join(["lambert"] + ["ward_bounded"] * 4))
+    figure = bc.plots.lobes(material, samples, theta_i_deg=theta_i_deg, scale=scale)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    texts = [*figure.texts, *(axes.title for axes in figure.axes)]
+    texts += [label for axes in figure.axes for label in axes.get_yticklabels() if label.get_text()]
+    boxes = [text.get_window_extent(renderer) for text in texts]
     width, height = figure.canvas.get_width_height()
     for i, box in enumerate(boxes):
         assert box.x0 >= 0

@@ -41,9 +41,10 @@ def test_one_panel_an_incidence_and_one_of_theta_h(fit: bc.Fit) -> None:
     assert entries == [*(f"incidence {t}°" for t in range(25, 76, 10)), "median", "2 sigma"]
 
 
-def test_points_are_data_minus_model_over_sigma(fit: bc.Fit) -> None:
+def test_points_are_model_minus_measurement_over_sigma(fit: bc.Fit) -> None:
     figure, samples = bc.plots.residuals(fit), fit.samples
-    left = (samples.values - fit.material.f(samples.wi, samples.wo).detach()) / samples.sigma
+    left = (fit.material.f(samples.wi, samples.wo).detach() - samples.values) / samples.sigma
+    assert figure.get_supylabel() == "(model - measurement) / sigma [1]"
     chosen = (samples.wi[:, 2] - math.cos(math.radians(45))).abs() < 1e-9
     x, y = points(figure, 2)
     np.testing.assert_allclose(y, left[chosen, 0].numpy())
@@ -58,10 +59,10 @@ def test_without_sigma_residuals_are_relative() -> None:
     samples = bc.Samples.from_angles([30.0] * 3, 0.0, [0.0, 30.0, 60.0], 180.0, [0.1, 0.2, 0.0], "degrees")
     figure = bc.plots.residuals_of(bc.material("lambert(kd=0.3)"), samples)
     f, d = 0.3 / math.pi, 0.001  # the median of 0.1 and 0.2 is torch's lower one
-    expected = [(y - f) / (y + d) for y in (0.1, 0.2, 0.0)]
+    expected = [(f - y) / (y + d) for y in (0.1, 0.2, 0.0)]
     drawn = sorted(y for line in figure.axes[0].get_lines() for y in line.get_ydata() if line.get_marker() == "o")
-    assert drawn == pytest.approx(sorted(expected)[-len(drawn) :])
-    assert figure.get_supylabel() == "relative residual [1]"
+    assert drawn == pytest.approx(sorted(expected)[: len(drawn)])
+    assert figure.get_supylabel() == "(model - measurement) /\n(measurement + 1 % of its median) [1]"
 
 
 def test_many_incidences_share_six_bands_that_show_every_sample() -> None:
@@ -93,10 +94,10 @@ def test_what_is_far_beyond_is_a_triangle_on_the_edge() -> None:
     figure = bc.plots.residuals_of(bc.material("lambert(kd=0.33)"), samples)
     below = figure.axes[-1]
     assert "beyond the axis" in [text.get_text() for text in figure.legends[0].get_texts()]
-    (edge,) = [line for line in below.get_lines() if line.get_marker() == "v" and len(line.get_ydata()) == 1]
+    (edge,) = [line for line in below.get_lines() if line.get_marker() == "^" and len(line.get_ydata()) == 1]
     low, high = below.get_ylim()
-    assert low < float(edge.get_ydata()[0]) < 0.9 * low
-    assert high < 1
+    assert 0.9 * high < float(edge.get_ydata()[0]) < high < 1
+    assert low == -high
 
 
 def test_of_many_samples_a_part_is_drawn() -> None:

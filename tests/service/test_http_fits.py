@@ -153,6 +153,11 @@ def test_every_argument_reaches_the_fit(http: TestClient) -> None:
     made = http.post("/v1/fits", json=body | narrow, headers={"prefer": "wait=20"}).json()
     assert made["request"]["max_theta_deg"] == 60
     result = made["result"]
+    asked = {name: value for name, value in result["options"].items() if name != "starts"}
+    assert asked == {name: value for name, value in narrow.items() if name != "starts"} | {
+        "max_theta_deg": pytest.approx(60)
+    }
+    assert result["options"]["starts"][0]["ward_bounded.a"] == 0.3
     rs = bc.Material.from_json(result["material"]).values()["ward_bounded.rs"]  # the data leave it free
     assert bool(((rs >= 0.1) & (rs <= 0.2)).all())
     assert "steeper than 60 degrees" in result["data"]["masked"][0]["reason"]
@@ -365,6 +370,7 @@ def test_every_model_is_listed(http: TestClient) -> None:
     models = http.get("/v1/models").json()["items"]
     assert [model["name"] for model in models] == list(bc.MODELS)
     for model in models:
+        assert model["good_for"] == bc.MODELS[model["name"]].good_for
         assert model["summary"]
         assert model["summary"] in model["text"]
         assert all({"name", "description", "low", "high"} <= set(parameter) for parameter in model["parameters"])

@@ -13,6 +13,7 @@ import pytest
 from page_checks import LOW_CONTRASTS, UNLABELLED, longest_task, unreached
 from service_cases import csv_file, measured_diffuser
 
+import brdfcore as bc
 from brdfcore.cli.serve import background
 from brdfcore.demo import DATA
 from service import keys
@@ -115,6 +116,8 @@ def test_from_the_example_to_a_fit_again_by_keyboard_and_mouse(page: Any, url: s
     page.keyboard.press("Enter")
     expect(page, "#about").to_contain_text("222")
     expect(page, "#about").to_contain_text("not turned, so models stay isotropic")
+    expect(page, "#lobes").to_contain_text(f"kurt{bc.MODELS['kurt'].good_for}")
+    expect(page, "#diffuse").to_contain_text(f"lambert: {bc.MODELS['lambert'].good_for}")
     only(page, "ward_bounded")
     page.fill("#text", "lambert")
     expect(page, "#start").to_have_text("Fit 2 models")
@@ -126,6 +129,7 @@ def test_from_the_example_to_a_fit_again_by_keyboard_and_mouse(page: Any, url: s
     expect(page, "#polar-title").to_have_text("In the plane of incidence, light at 45°: 37 measured")
     for name in ("polar", "albedo", "residuals"):
         page.wait_for_selector(f"#{name} .main-svg")
+    expect(page, "#residuals .ytitle").to_have_text("model - measurement [% of their mean]")
     assert len(page.evaluate(SOLID)) > 5000
     assert page.evaluate(UNLABELLED) == []
     assert page.evaluate(LOW_CONTRASTS) == []

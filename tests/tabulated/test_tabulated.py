@@ -140,7 +140,9 @@ def test_figures_stand_beside_fitted_ones(table, monkeypatch) -> None:
     figure = bc.plots.albedo({"measured": table, "model": bc.material("lambert + ggx")}, tolerance=0.1)
     assert figure.legends[0].legend_handles[0].get_label().startswith("measured")
     figure = bc.plots.lobes(table, theta_i_deg=[20, 60])
-    assert "small." in figure.texts[0].get_text()
+    title, caption = (text.get_text() for text in figure.texts)
+    assert "small." in title
+    assert "channel r," in caption
     assert str(table).startswith("small.")
     assert table.channels == 3
     assert table.channel_names == ("r", "g", "b")
