@@ -1,6 +1,7 @@
 /** The service: requests with the key, errors as its sentences, and a job's events. */
 
 const KEY = "brdf-api-key";
+const PLAIN = /^[\x21-\x7e]+$/; // what a header may carry
 const AGAIN = [408, 429, 500, 502, 503, 504]; // refusals that may be over soon
 const LONGEST = 10_000; // between two attempts [ms]
 
@@ -17,6 +18,18 @@ export class Refusal extends Error {
   }
 }
 
+/** An error that lies between the page and the service. */
+export class Unreached extends Error {}
+
+/** @type {() => void} what is done once the service answers after it did not */
+let reached = () => undefined;
+let lost = false;
+
+/** @param {() => void} listener */
+export function onReached(listener) {
+  reached = listener;
+}
+
 /** @type {() => Promise<void>} what gets a key from the person; resolves when there is one to try */
 let askForKey = async () => undefined;
 
@@ -25,14 +38,21 @@ export function onMissingKey(ask) {
   askForKey = ask;
 }
 
-/** @param {string} key kept for this tab only */
+/** Keep a key, for this tab only; throws where no service could have given it. @param {string} key */
 export function useKey(key) {
+  if (!PLAIN.test(key)) throw new Error("Expected a key of plain letters, digits and signs, without spaces or accents. Copy it once more.");
   sessionStorage.setItem(KEY, key);
+}
+
+/** @returns {string | null} */
+function storedKey() {
+  const key = sessionStorage.getItem(KEY);
+  return key !== null && PLAIN.test(key) ? key : null;
 }
 
 /** @returns {boolean} */
 export function hasKey() {
-  return sessionStorage.getItem(KEY) !== null;
+  return storedKey() !== null;
 }
 
 /**
@@ -46,12 +66,12 @@ export async function ask(path, options = {}) {
   const headers = new Headers(options.headers);
   if (json !== undefined) headers.set("content-type", "application/json");
   for (;;) {
-    const key = sessionStorage.getItem(KEY);
+    const key = storedKey();
     if (key !== null) headers.set("authorization", `Bearer ${key}`);
     const answer = await sent(path, { ...rest, headers, ...(json === undefined ? {} : { body: JSON.stringify(json) }) });
     if (answer.ok) return answer;
     if (answer.status !== 401) throw new Refusal(answer.status, await answer.json().catch(() => ({})));
-    if (sessionStorage.getItem(KEY) === key) await askForKey(); // else somebody has given another one meanwhile
+    if (storedKey() === key) await askForKey(); // else somebody has given another one meanwhile
   }
 }
 
@@ -61,10 +81,14 @@ export async function ask(path, options = {}) {
  */
 async function sent(path, options) {
   try {
-    return await fetch(path, options);
+    const answer = await fetch(path, options);
+    if (lost) reached();
+    lost = false;
+    return answer;
   } catch (error) {
     if (error instanceof DOMException && error.name === "AbortError") throw error;
-    throw new Error("The service could not be reached. Check that it runs, and try again.");
+    lost = true;
+    throw new Unreached("The service could not be reached. Check that it runs, and try again.");
   }
 }
 

@@ -12,7 +12,8 @@ const LOSSES = {
   log: "log: tails count more",
   relative: "relative: every sample alike",
 };
-const AT_FIRST = ["ward_bounded", "ggx"];
+const PLACE = "brdf-choice"; // of the form in this tab's memory
+const FIRST = ["ward_bounded", "ggx"]; // of the list: what is fitted most
 
 let asking = false; // while the service has not yet accepted what was asked for
 
@@ -22,6 +23,7 @@ export async function install() {
   at("find-model").addEventListener("input", filter);
   at("find-model").addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && event.preventDefault()); // it finds, and fits nothing
   at("choose").addEventListener("submit", begin);
+  for (const act of ["change", "input"]) at("choose").addEventListener(act, remember);
   at("choose").addEventListener("change", ready);
   at("text").addEventListener("input", ready);
   on("dataset", ready);
@@ -31,9 +33,10 @@ export async function install() {
   const lobes = state.models.filter((model) => !isDiffuse(model));
   // a diffuse term with an f0 is tied to a lobe's: that is for the text field
   const diffuse = state.models.filter((model) => isDiffuse(model) && !named(model, "f0"));
-  lobes.sort((a, b) => Number(AT_FIRST.includes(b.name)) - Number(AT_FIRST.includes(a.name)));
+  lobes.sort((a, b) => Number(FIRST.includes(b.name)) - Number(FIRST.includes(a.name)));
   at("lobes").append(...lobes.map(entry));
   at("diffuse").append(...diffuse.map(({ name, good_for }) => made("option", { value: name }, `${name}: ${good_for}`)), made("option", { value: "" }, "none"));
+  recall();
   ready();
 }
 
@@ -44,15 +47,29 @@ function named(model, parameter) {
 
 /** @param {any} model */
 function entry({ name, good_for: line }) {
-  const box = made("input", { type: "checkbox", name: "lobe", value: name, checked: AT_FIRST.includes(name) });
+  const box = made("input", { type: "checkbox", name: "lobe", value: name });
   return made("label", { class: "model" }, box, made("span", {}, made("b", {}, name), made("span", {}, line)));
 }
 
-/** Offer the choice by the data where this service knows it. */
-export function offerAuto() {
-  at("auto").replaceChildren(
-    made("label", { class: "check" }, made("input", { type: "checkbox", id: "use-auto" }), "auto: add the effects that the data call for, one by one"),
-  );
+/** @returns {any[]} the controls that say what is fitted */
+function fields() {
+  return [...at("choose").querySelectorAll("input:not(#find-model), select, textarea")];
+}
+
+/** Keep what is chosen, so that a reload finds it. */
+function remember() {
+  const chosen = fields().map((field) => [field.id || field.value, field.type === "checkbox" ? field.checked : field.value]);
+  sessionStorage.setItem(PLACE, JSON.stringify(Object.fromEntries(chosen)));
+}
+
+function recall() {
+  const chosen = JSON.parse(sessionStorage.getItem(PLACE) ?? "{}");
+  for (const field of fields()) {
+    const value = chosen[field.id || field.value];
+    if (value === undefined) continue;
+    if (field.type === "checkbox") field.checked = value;
+    else field.value = value;
+  }
 }
 
 function filter() {
@@ -66,14 +83,15 @@ function texts() {
   const diffuse = at("diffuse").value;
   const lobes = [...at("lobes").querySelectorAll("input:checked")].map((box) => (diffuse ? `${diffuse} + ${box.value}` : box.value));
   const own = at("text").value.split("\n").map((/** @type {string} */ line) => line.trim()).filter(Boolean);
-  const auto = document.querySelector("#use-auto:checked") ? ["auto"] : [];
+  const auto = at("use-auto").checked ? ["auto"] : [];
   return [...new Set([...auto, ...lobes, ...own])];
 }
 
 function ready() {
   const count = texts().length;
   const missing = state.pending || (state.dataset === null ? "Choose a measurement first." : count === 0 ? "Choose a model." : "");
-  at("start").disabled = asking || missing !== "";
+  at("start").disabled = missing !== "";
+  at("start").setAttribute("aria-disabled", String(asking)); // it keeps the keyboard meanwhile
   at("start").textContent = count > 1 ? `Fit ${count} models` : "Fit";
   at("start-hint").textContent = missing;
 }
@@ -81,7 +99,7 @@ function ready() {
 /** @param {Event} event */
 async function begin(event) {
   event.preventDefault();
-  if (state.dataset === null) return;
+  if (state.dataset === null || asking) return;
   complain("choose-error", null);
   asking = true;
   ready();

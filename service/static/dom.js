@@ -52,7 +52,7 @@ export function breakable(text) {
   return made("span", {}, first, ...rest.flatMap((part) => ["(", made("wbr"), part]));
 }
 
-/** @type {Map<string, Map<string, string>>} what stands where, and from where it came */
+/** @type {Map<string, Map<string, unknown>>} what stands where, and from where it came */
 const complaints = new Map();
 
 /**
@@ -66,10 +66,34 @@ export function complain(id, error, source = "") {
   const all = complaints.get(id) ?? new Map();
   complaints.set(id, all);
   if (error === null) all.delete(source);
-  else all.set(source, inWords(error));
+  else all.set(source, error);
   const element = at(id);
   element.hidden = all.size === 0;
-  element.textContent = [...new Set(all.values())].join("\n");
+  element.textContent = [...new Set([...all.values()].map(inWords))].join("\n");
+}
+
+/** Take back every error of a kind that is over. @param {(error: unknown) => boolean} over */
+export function forgive(over) {
+  for (const [id, all] of complaints)
+    for (const [source, error] of all) if (over(error)) complain(id, null, source);
+}
+
+/**
+ * Do what replaces elements of a container, and leave the keyboard at the control that was in use there, where there still is one.
+ * @param {HTMLElement} container
+ * @param {() => void} change
+ */
+export function inPlace(container, change) {
+  const active = container.contains(document.activeElement) ? document.activeElement : null;
+  const name = active?.id ? `#${CSS.escape(active.id)}` : active?.hasAttribute("data-does") ? `[data-does="${CSS.escape(active.getAttribute("data-does") ?? "")}"]` : null;
+  change();
+  if (name !== null && document.activeElement !== active) /** @type {HTMLElement | null} */ (container.querySelector(name))?.focus({ preventScroll: true });
+}
+
+/** Bring a part of the page into view, and the keyboard to it. @param {string} id of an element that takes the focus */
+export function leadTo(id) {
+  at(id).scrollIntoView();
+  at(id).focus({ preventScroll: true });
 }
 
 /** @param {unknown} error @returns {string} */

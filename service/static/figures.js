@@ -47,7 +47,7 @@ export function colours() {
   const style = getComputedStyle(document.documentElement);
   const named = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim();
   return {
-    ink: named("ink"), soft: named("soft"), line: named("line"), bad: named("bad"),
+    ink: named("ink"), soft: named("soft"), line: named("line"), bad: named("bad"), card: named("card"),
     series: Array.from({ length: SERIES }, (_, k) => named(`series-${k}`)),
   };
 }

@@ -1,38 +1,52 @@
-/** Step 3: fits under way, each with its progress, its falling loss and a button that cancels it. */
+/** Step 3: the fits of the page, asked for, opened and followed. */
 
-import { ask, followed, get, Refusal } from "./api.js";
-import { at, inWords, made, shown } from "./dom.js";
+import { get, Refusal } from "./api.js";
+import { at, inWords, leadTo } from "./dom.js";
+import { mannerOf } from "./fit.js";
+import { line } from "./job.js";
 import { subject } from "./latest.js";
-import { about, arrived, belongs, nameOf, on, present, state } from "./state.js";
+import { about, add, chosen, on, present, state } from "./state.js";
 
-const FINISHED = ["succeeded", "failed", "cancelled"];
-/** @type {Record<string, string>} */
-const WORDS = { queued: "waiting", running: "running", succeeded: "done", failed: "failed", cancelled: "cancelled" };
-
-/** @type {Map<string, {element: HTMLElement, leave: AbortController}>} the lines on the page by the fit's id */
+/** @type {Map<string, {element: HTMLElement, leave: AbortController, manner: (text: string) => void}>} the lines on the page by the fit's id */
 const lines = new Map();
 
 /** Keep a line for each fit of the page, and the address that names them. */
 export function install() {
   on("fits", () => {
-    for (const [id, line] of lines) if (!state.fits.has(id)) line.leave.abort(), lines.delete(id);
-    for (const fit of state.fits.values()) if (!lines.has(fit.id)) lines.set(fit.id, row(fit));
+    for (const [id, { leave }] of lines) if (!state.fits.has(id)) leave.abort(), lines.delete(id);
+    for (const fit of state.fits.values()) if (!lines.has(fit.id)) lines.set(fit.id, line(fit));
     const wanted = [...state.fits.keys()].map((id) => lines.get(id)?.element);
     if (wanted.some((element, k) => at("jobs").children[k] !== element) || at("jobs").childElementCount !== wanted.length)
       at("jobs").replaceChildren(...wanted);
+    for (const fit of state.fits.values()) lines.get(fit.id)?.manner(mannerOf(fit));
     at("progress").hidden = wanted.length === 0;
     name();
   });
+  on("chosen", reveal);
+  for (const act of ["wheel", "touchmove", "keydown", "pointerdown"]) window.addEventListener(act, () => (awaited = false), { passive: true });
 }
 
-/** Let the address name the fits of the page. */
+let awaited = false; // a result: nobody has done anything since it was asked for
+
+/** Show the first result of what was asked for last, unless somebody has turned to something else. */
+function reveal() {
+  const fit = chosen();
+  if (!awaited || fit === null || !state.asked.has(fit.job ?? fit.id)) return;
+  awaited = false;
+  at("result").scrollIntoView();
+}
+
+/** Let the address name the fits of the page; the browser's way back leads to those before others came. */
 function name() {
+  const named = location.hash.startsWith("#fit=") ? location.hash.slice("#fit=".length).split(",") : [];
   const fits = state.fits.size > 0 ? `#fit=${[...state.fits.keys()].join(",")}` : "";
-  if (fits !== location.hash && (fits || location.hash.startsWith("#fit="))) history.replaceState(null, "", fits || location.pathname + location.search);
+  if (fits === location.hash || (!fits && named.length === 0)) return;
+  const more = named.length > 0 && [...state.fits.keys()].some((id) => !named.includes(id));
+  history[more ? "pushState" : "replaceState"](null, "", fits || location.pathname + location.search);
 }
 
 /**
- * Ask for fits of the page's measurement, and follow them in place of those before; throws where one was not accepted.
+ * Ask for fits of the page's measurement, and follow them beside those before; throws where one was not accepted.
  * @param {any[]} requests bodies of POST /v1/fits
  */
 export async function submit(requests) {
@@ -47,8 +61,9 @@ export async function submit(requests) {
     }
   }
   if (fits.length > 0 && !signal.aborted) {
-    present(fits);
+    add(fits);
     at("progress").scrollIntoView({ block: "nearest" });
+    awaited = true;
   }
   if (refused.length > 0) throw new Error(refused.join("\n"));
 }
@@ -66,7 +81,7 @@ export async function open(ids) {
       return await get(path, { signal });
     } catch (error) {
       signal.throwIfAborted();
-      missing.push(inWords(error));
+      missing.push(error instanceof Refusal && error.status === 404 ? `${path.split("/").at(-1)} is not here: removed, or of another service.` : inWords(error));
       return null;
     }
   };
@@ -82,83 +97,20 @@ export async function open(ids) {
 }
 
 /**
- * The line of a fit, which follows it to its end.
+ * The body that asks for a fit once more, its model as it came out.
  * @param {import("./state.js").Fit} fit
+ * @param {Record<string, unknown>} other than it was asked for
  */
-function row(fit) {
-  const leave = new AbortController();
-  const name = nameOf(fit);
-  const bar = made("progress", { max: 1, "aria-label": `Progress of ${name}` });
-  const said = made("span", { class: "note" });
-  const spoken = made("span", { class: "seen-by-readers", role: "status" }); // its losses would be too much to hear
-  const svg = sparkline(name);
-  const cancel = made("button", { type: "button", class: "small", "aria-label": `Cancel ${name}` }, "Cancel");
-  const failure = made("p", { class: "error", role: "alert", hidden: true });
-  /** @type {Record<string, string | null>} why it failed, could not be cancelled, or is not heard of */
-  const reasons = {};
-  const fail = (/** @type {string} */ source, /** @type {string | null} */ text) => {
-    if ((reasons[source] ?? null) === text) return; // said once, heard once
-    reasons[source] = text;
-    failure.textContent = Object.values(reasons).filter(Boolean).join("\n");
-    failure.hidden = failure.textContent === "";
-  };
-  /** @type {number[]} */
-  const losses = [];
-  let words = "";
-  const tell = (/** @type {any} */ { status, progress, error }) => {
-    const loss = progress?.loss ?? null;
-    if (loss !== null) losses.push(Math.min(loss, losses.at(-1) ?? loss)); // the lowest so far: starts are tried in turn
-    bar.value = status === "succeeded" ? 1 : (progress?.fraction ?? 0);
-    said.textContent = words = `${WORDS[status]}${loss === null ? "" : `, loss ${shown(loss)}`}`;
-    if (spoken.dataset.status !== status) spoken.textContent = `${name}: ${WORDS[status]}`;
-    spoken.dataset.status = status;
-    svg.draw(losses);
-    cancel.hidden = FINISHED.includes(status);
-    fail("fit", error);
-  };
-  const ended = (/** @type {import("./state.js").Fit} */ now) =>
-    tell(now.result ? { ...now, progress: { fraction: 1, loss: now.result.objective } } : now);
-  const lost = (/** @type {unknown} */ error) => {
-    said.textContent = error === null ? words : error instanceof Refusal ? "trying again …" : "connection lost, trying again …";
-    fail("stream", error instanceof Refusal ? error.message : null);
-  };
-  cancel.addEventListener("click", async () => {
-    cancel.disabled = true;
-    fail("cancel", null);
-    try {
-      await ask(`/v1/fits/${fit.id}/cancel`, { method: "POST" });
-    } catch (error) {
-      cancel.disabled = false;
-      if (!(error instanceof Refusal && error.status === 409)) fail("cancel", inWords(error)); // 409: it has just ended
-    }
-  });
-  ended(fit);
-  if (!FINISHED.includes(fit.status)) {
-    followed(fit.id, tell, lost, leave.signal)
-      .then((now) => {
-        ended(now);
-        arrived(now);
-      })
-      .catch((error) => leave.signal.aborted || fail("stream", inWords(error)));
-  }
-  const element = made("div", { class: "job" }, made("span", { class: "code" }, name), bar, said, svg.element, made("span", {}, cancel, spoken), failure);
-  return { element, leave };
+export function again(fit, other) {
+  const { samples, model, models, ...options } = fit.request;
+  const given = Object.fromEntries(Object.entries(options).filter(([, value]) => value !== null));
+  return { ...given, model: model === "auto" ? fit.result.model : model, ...other };
 }
 
-/** A small drawing of how the loss falls, its scale logarithmic. @param {string} name */
-function sparkline(name) {
-  const space = "http://www.w3.org/2000/svg";
-  const element = document.createElementNS(space, "svg");
-  const line = document.createElementNS(space, "polyline");
-  for (const [key, value] of Object.entries({ class: "spark", viewBox: "0 0 100 24", preserveAspectRatio: "none", role: "img" }))
-    element.setAttribute(key, value);
-  element.setAttribute("aria-label", `The loss of ${name} as it falls`);
-  element.append(line);
-  const draw = (/** @type {number[]} */ losses) => {
-    const logs = losses.map((loss) => Math.log(Math.max(loss, 1e-300)));
-    const low = Math.min(...logs), span = Math.max(Math.max(...logs) - low, 0.01); // 1 %, below which it lies flat
-    const step = 96 / Math.max(logs.length - 1, 1);
-    line.setAttribute("points", logs.length < 2 ? "" : logs.map((y, k) => `${2 + step * k},${21 - (18 * (y - low)) / span}`).join(" "));
-  };
-  return { element, draw };
+/** Show an earlier fit, beside those of its measurement that are on the page, and lead the eye to it. @param {import("./state.js").Fit} fit */
+export async function reopen(fit) {
+  const { dataset } = fit.request;
+  if (dataset !== null && dataset === state.dataset?.id) add([await get(`/v1/fits/${fit.id}`, { signal: subject() })]);
+  else await open([fit.id]);
+  leadTo(chosen() === null ? "progress" : "result");
 }

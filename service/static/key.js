@@ -14,20 +14,23 @@ export function install() {
 /** @returns {Promise<void>} */
 function asked() {
   const form = at("key");
+  const before = /** @type {HTMLElement} */ (document.activeElement);
   complain("key-error", hasKey() ? "Expected a key that this service knows. Check it, and try again." : null);
   form.hidden = false;
   at("key-text").focus();
   return new Promise((done) => {
-    form.addEventListener(
-      "submit",
-      (/** @type {Event} */ event) => {
-        event.preventDefault();
+    form.onsubmit = (/** @type {Event} */ event) => {
+      event.preventDefault();
+      try {
         useKey(at("key-text").value.trim());
-        at("key-text").value = "";
-        form.hidden = true;
-        done();
-      },
-      { once: true },
-    );
+      } catch (error) {
+        complain("key-error", error);
+        return at("key-text").focus();
+      }
+      at("key-text").value = "";
+      form.hidden = true;
+      (before === document.body ? at("main") : before).focus({ preventScroll: true });
+      done();
+    };
   });
 }

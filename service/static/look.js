@@ -5,11 +5,12 @@ import { get } from "./api.js";
 import { cosineRms, drawAlbedo, drawResiduals, THETAS } from "./curves.js";
 import { hemisphere, joined, plane } from "./directions.js";
 import { at, complain, made, shown } from "./dom.js";
+import { byHand, materialOf, valuesOf } from "./fit.js";
 import { tell } from "./hand.js";
 import { latest } from "./latest.js";
 import { drawPolar, measured, turnable } from "./polar.js";
 import { drawSolid, install as turnSolid, paint } from "./solid.js";
-import { byHand, chosen, look, materialOf, on, ranked, state, valuesOf } from "./state.js";
+import { chosen, look, on, ranked, state } from "./state.js";
 
 const SCALES = { linear: "linear", cube_root: "cube root", log: "log" };
 
@@ -55,16 +56,16 @@ function aim() {
   if (here(best) >= ENOUGH) state.theta = best;
 }
 
-/** @returns {number[]} the angles of incidence of the samples, each once, at most 40 */
-function incidences() {
-  const angles = [...new Set((state.samples?.theta_i_deg ?? []).map((theta) => Math.round(theta * 10) / 10))].sort((a, b) => a - b);
+/** @param {"theta" | "phi"} name @returns {number[]} the angles of the light of the samples, each once, at most 40 */
+function lights(name) {
+  const angles = [...new Set((state.samples?.[`${name}_i_deg`] ?? []).map((theta) => Math.round(theta * 10) / 10))].sort((a, b) => a - b);
   return angles.length > 40 ? [] : angles;
 }
 
 /** The controls that the fit calls for; those that are there stay, since one may be in use. @param {import("./state.js").Fit} fit */
 function controls(fit) {
   const turns = turnable() || fit.result.material.terms.some((/** @type {any} */ term) => term.options.includes("anisotropic"));
-  const needed = JSON.stringify([turns, fit.result.channels, incidences()]);
+  const needed = JSON.stringify([turns, fit.result.channels, lights("theta"), lights("phi")]);
   if (needed !== shape) {
     shape = needed;
     build(turns, fit.result.channels);
@@ -99,7 +100,7 @@ function build(turns, channels) {
 /** @param {"theta" | "phi"} name @param {string} text @param {number} low @param {number} high */
 function slide(name, text, low, high) {
   const value = made("output", { for: `light-${name}`, id: `said-${name}` });
-  const marks = made("datalist", { id: `marks-${name}` }, ...(name === "theta" ? incidences() : []).map((theta) => made("option", { value: theta })));
+  const marks = made("datalist", { id: `marks-${name}` }, ...lights(name).map((theta) => made("option", { value: theta })));
   const input = made("input", { type: "range", id: `light-${name}`, min: low, max: high, step: name === "theta" ? 0.5 : 5, list: `marks-${name}` });
   input.value = String(state[name]);
   input.addEventListener("input", () => {

@@ -1,13 +1,15 @@
 /** The page starts here. */
 
+import { onReached, Unreached } from "./api.js";
 import * as choice from "./choice.js";
-import { at, complain } from "./dom.js";
+import { at, complain, forgive } from "./dom.js";
 import * as earlier from "./earlier.js";
 import * as facts from "./facts.js";
 import { prepare } from "./figures.js";
 import * as hand from "./hand.js";
 import * as jobs from "./jobs.js";
 import * as key from "./key.js";
+import * as legend from "./legend.js";
 import * as look from "./look.js";
 import * as measurement from "./measurement.js";
 import * as offers from "./offers.js";
@@ -17,6 +19,7 @@ import { on, present, state } from "./state.js";
 import * as take from "./take.js";
 import * as where from "./where.js";
 
+onReached(() => forgive((error) => error instanceof Unreached));
 key.install();
 measurement.install();
 facts.install();
@@ -24,6 +27,7 @@ jobs.install();
 result.install();
 sphere.install();
 hand.install();
+legend.install();
 look.install();
 take.install();
 where.install();

@@ -28,6 +28,7 @@ export async function drawPolar(curves) {
   }));
   traces.sort((a, b) => a.line.width - b.line.width);
   const { tickvals, ticktext } = rings(state.scale, top);
+  if (ticktext.length > 0) ticktext[0] += " 1/sr";
   const plain = { type: "scatter", mode: "lines", hoverinfo: "skip" };
   const light = { ...plain, ...placed([-state.theta, 0], [1, 0]), line: { color: soft, width: 1.2, dash: "dash" } };
   const dots = {
@@ -48,7 +49,7 @@ export async function drawPolar(curves) {
   await draw(at("polar"), [{ ...plain, ...grid(tickvals), line: { color: line, width: 1 } }, words, light, ...traces, dots], {
     margin: MARGIN, xaxis: { ...axis, range: x }, yaxis: { ...axis, range: y },
   });
-  at("polar-title").textContent = `In the plane of incidence, light at ${shown(state.theta)}°`
+  at("polar-title").textContent = `In the plane of incidence, light at ${shown(state.theta)}°${turnable() ? `, azimuth ${shown(state.phi)}°` : ""}`
     + (points.length ? `: ${points.length} measured` : state.samples ? ": none measured" : "");
 }
 

@@ -24,35 +24,45 @@ export function asked(field) {
   return field !== null && field in QUESTIONS;
 }
 
+/** @param {Record<string, string | boolean | null>} declared of a dataset @returns {string} that in words, "" for nothing */
+export function inPlain(declared) {
+  const words = (/** @type {string} */ field) => QUESTIONS[field]?.[1].find(([value]) => value === declared[field])?.[1] ?? `${field} ${declared[field]}`;
+  const told = Object.keys(declared).filter((field) => declared[field] !== null && declared[field] !== false);
+  return told.map((field) => (field === "rgb" ? "its spectrum read as red, green and blue" : words(field))).join("; ");
+}
+
 /**
  * Ask for one of a few answers.
  * @param {string} name of the file
  * @param {string} field one that is `asked`
+ * @param {string | undefined} before what was answered last, which was refused
  * @param {(answer: string) => void} answered
+ * @param {() => void} cancelled
  */
-export function question(name, field, answered) {
+export function question(name, field, before, answered, cancelled) {
   const [text, answers] = QUESTIONS[field];
   const choices = answers.map(([value, meaning]) =>
-    made("label", { class: "check" }, made("input", { type: "radio", name: field, value, required: true }), meaning),
+    made("label", { class: "check" }, made("input", { type: "radio", name: field, value, required: true, checked: value === before }), meaning),
   );
   const parts = [
-    made("fieldset", {}, made("legend", {}, `${name} does not say: ${text}`), ...choices),
-    made("button", { type: "submit", class: "primary" }, "Go on"),
+    made("fieldset", {}, made("legend", {}, before === undefined ? `${name} does not say: ${text}` : `${name} cannot be read so: ${text}`), ...choices),
+    made("div", { class: "row" }, made("button", { type: "submit", class: "primary" }, "Go on"), leaving(cancelled)),
   ];
   ask(parts, () => answered(String(new FormData(at("ask")).get(field))));
-  at("ask").querySelector("input").focus();
+  at("ask").querySelector("input:checked, input").focus();
 }
 
 /**
  * Ask for the columns of a table.
  * @param {string | undefined} before what was answered last, which was wrong
  * @param {(names: string) => void} answered
+ * @param {() => void} cancelled
  */
-export function nameColumns(before, answered) {
+export function nameColumns(before, answered, cancelled) {
   const input = made("input", { type: "text", id: COLUMNS, name: COLUMNS, required: true, autocomplete: "off", spellcheck: "false", value: before ?? USUAL, "aria-describedby": "columns-hint" });
   const parts = [
     made("label", { for: COLUMNS }, "If it is a table of numbers, what are its columns, from the left?"),
-    made("div", { class: "row" }, input, made("button", { type: "submit", class: "primary" }, "Read it so")),
+    made("div", { class: "row" }, input, made("button", { type: "submit", class: "primary" }, "Read it so"), leaving(cancelled)),
     made("p", { class: "hint", id: "columns-hint" }, "Four angles, or wi_x to wo_z, in any order, and a name for each value. Without _deg or _rad, the unit is asked for."),
   ];
   ask(parts, () => answered(input.value.trim()));
@@ -70,6 +80,27 @@ export function offerColour(channels, taken) {
     made("p", { class: "hint" }, "The channels are wavelengths. Renderers take three colours: "),
     made("button", { type: "submit" }, "Read as red, green and blue"),
   ], taken);
+}
+
+/** @param {() => void} cancelled */
+function leaving(cancelled) {
+  return made("button", { type: "button", onclick: cancelled }, "Cancel");
+}
+
+/** Take the question back. */
+export function close() {
+  at("ask").hidden = true;
+}
+
+/** @param {Blob} file @returns {Promise<boolean>} whether it begins as text with a line that is no comment, so that it may be a table */
+export async function textual(file) {
+  const head = await file.slice(0, 4096).arrayBuffer();
+  try {
+    const text = new TextDecoder("utf-8", { fatal: true }).decode(head, { stream: true });
+    return !/[\x00-\x08]/.test(text) && /^[^\S\n]*[^#\s]/m.test(text);
+  } catch {
+    return false;
+  }
 }
 
 /** @param {Node[]} parts of the form @param {() => void} answered */

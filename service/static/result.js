@@ -1,9 +1,13 @@
 /** Step 4: what came out, the models ranked side by side and the chosen one in full. */
 
-import { at, breakable, made, shown, table } from "./dom.js";
+import { at, breakable, complain, made, shown, table } from "./dom.js";
 import { SERIES } from "./figures.js";
-import { choose, chosen, on, ranked, state } from "./state.js";
+import { originOf } from "./fit.js";
+import { again, submit } from "./jobs.js";
+import { nameOfDataset } from "./names.js";
+import { choose, chosen, on, ranked, state, yardstick } from "./state.js";
 
+const ADVISED = /="(log|cube_root|relative)"/; // a loss that a warning names
 const FEW = 4; // channels whose values are all shown at once
 
 /** Show results as they come. */
@@ -26,7 +30,7 @@ function rank() {
   const rows = fits.map((fit, k) => [
     `${k + 1}`,
     choice(fit, k),
-    ...losses.map((loss) => figure(fit.result.errors[loss], fits.length > 1 && fit.result.errors[loss] === best[loss])),
+    ...losses.map((loss) => figure(fit.result.errors[loss], fits.length > 1 && shown(fit.result.errors[loss]) === shown(best[loss]))),
     energy(fit.result.certificate),
     `${fit.result.cost.seconds.toFixed(2)} s`,
   ]);
@@ -34,10 +38,19 @@ function rank() {
   const shownTable = table("Models, the best first, with their errors under every loss", ["Rank", "Model", ...heads, "Energy", "Time#"], rows);
   const chosenRow = fits.findIndex((fit) => fit.id === state.chosen);
   shownTable.querySelectorAll("tbody tr")[chosenRow]?.classList.add("chosen");
-  const several = fits.length > 1 ? made("p", { class: "hint" }, `Ranked by what was minimised, ${minimised(fits[0].result)}; the lowest error of a column is bold.`) : null;
+  const several = fits.length > 1 ? made("p", { class: "hint" }, `Ranked by ${measure(fits[0].result)}; the lowest error of a column is bold.`) : null;
   const focused = document.activeElement?.getAttribute("name") === "chosen-fit";
-  at("ranking").replaceChildren(shownTable, ...(several ? [several] : []));
+  const file = nameOfDataset(fits[0].request.dataset);
+  const subject = file && made("p", { class: "hint" }, `Fitted to ${file.name}${file.remark && `: ${file.remark}`}.`);
+  at("ranking").replaceChildren(...(subject ? [subject] : []), shownTable, ...(several ? [several] : []));
   if (focused) at("ranking").querySelector("input:checked")?.focus();
+}
+
+/** @param {any} result @returns {string} by what the fits are ranked */
+function measure({ chi_square }) {
+  const { loss, same } = yardstick();
+  if (!same) return `their error under ${loss}, since they minimised different losses`;
+  return `what was minimised, ${minimised({ loss, chi_square })}`;
 }
 
 /** @param {any} result */
@@ -49,7 +62,7 @@ function minimised({ loss, chi_square, weighed, options }) {
 /** @param {import("./state.js").Fit} fit @param {number} rank from 0, which is the colour of its curves */
 function choice(fit, rank) {
   const radio = made("input", { type: "radio", name: "chosen-fit", checked: fit.id === state.chosen, onchange: () => choose(fit.id) });
-  return made("label", { class: "choice code" }, radio, made("span", { class: `swatch swatch-${rank % SERIES}` }), breakable(fit.result.model));
+  return made("label", { class: "choice code" }, radio, made("span", { class: `swatch swatch-${rank % SERIES}` }), made("span", {}, breakable(fit.result.model), " ", made("span", { class: "hint" }, originOf(fit))));
 }
 
 /** @param {number | null} value @param {boolean} best */
@@ -76,7 +89,8 @@ function detail() {
   ];
   if (result.undetermined.length > 0)
     parts.push(made("p", { class: "said" }, `The data do not determine ${result.undetermined.join(", ")}: other values fit as well, so none is stated.`));
-  for (const sentence of [...result.warnings, ...result.choices]) parts.push(made("p", { class: "hint" }, sentence));
+  for (const sentence of result.warnings) parts.push(warning(fit, sentence));
+  for (const sentence of result.choices) parts.push(made("p", { class: "hint" }, sentence));
   parts.push(
     made("h3", {}, "Certificate"),
     made("p", { class: `verdict ${!result.certificate.decided ? "" : result.certificate.energy_conserving ? "good" : "bad"}` }, result.certificate.verdict),
@@ -87,6 +101,17 @@ function detail() {
   if (result.conservation && !(result.conservation.free_max_albedo <= 1)) parts.push(made("p", {}, conserved(result)));
   if (result.ladder?.length) parts.push(made("h3", {}, "How it was chosen"), ladder(result.ladder));
   at("details").replaceChildren(...parts);
+}
+
+/** A warning, with what it advises at hand. @param {import("./state.js").Fit} fit @param {string} sentence */
+function warning(fit, sentence) {
+  const loss = ADVISED.exec(sentence)?.[1];
+  const button = made("button", { type: "button", class: "small" }, `Fit again with ${loss}`);
+  button.addEventListener("click", async () => {
+    complain("result-error", null, "again");
+    await submit([again(fit, { loss, starts: [] })]).catch((error) => complain("result-error", error, "again"));
+  });
+  return made("div", { class: "warning" }, made("p", {}, sentence), loss && fit.request.dataset !== null ? button : null);
 }
 
 /** @param {any} result */
@@ -142,7 +167,7 @@ function interval(result, key, value, interval) {
 /** @param {any[]} rungs */
 function ladder(rungs) {
   const rows = rungs.map((rung) => [
-    rung.effect, made("span", { class: "code" }, rung.model), shown(rung.error), shown(rung.held_out), rung.kept ? "kept" : "left out", rung.reason,
+    rung.effect, rung.kept ? "kept" : "left out", made("div", { class: "why" }, rung.reason), made("span", { class: "code" }, rung.model), shown(rung.error), shown(rung.held_out),
   ]);
-  return table("The materials that were tried", ["Effect", "Model", "Error#", "Held-out error#", "", "Why"], rows);
+  return table("The materials that were tried", ["Effect", "", "Why", "Model", "Error#", "Held-out error#"], rows);
 }

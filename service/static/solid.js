@@ -43,21 +43,28 @@ export function drawSolid(vectors, f) {
 /** Draw the mesh as it is seen now. */
 export function paint() {
   const canvas = at("solid");
-  if (canvas.clientWidth > 0) painted(canvas, mesh);
+  const { clientWidth, clientHeight } = canvas;
+  if (clientWidth > 0) painted(canvas, mesh, clientWidth, clientHeight, window.devicePixelRatio || 1);
 }
 
-/** A lobe as one is seen now, as a PNG file. @param {typeof mesh} lobe @returns {Promise<Blob>} */
-export function picture(lobe) {
+/** A lobe as one is seen now, as a PNG file of 1280 by 960 pixels. @param {typeof mesh} lobe @param {string} title @returns {Promise<Blob>} */
+export function picture(lobe, title) {
   const canvas = made("canvas");
-  painted(canvas, lobe);
+  painted(canvas, lobe, 640, 480, 2);
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  pen.globalCompositeOperation = "destination-over"; // behind the lobe
+  pen.fillStyle = colours().card;
+  pen.fillRect(0, 0, 640, 480);
+  pen.globalCompositeOperation = "source-over";
+  pen.fillStyle = colours().ink;
+  pen.font = "14px system-ui, sans-serif";
+  pen.fillText(title, 12, 22, 616);
   return new Promise((done) => canvas.toBlob(done));
 }
 
-/** @param {HTMLCanvasElement} canvas @param {typeof mesh} lobe */
-function painted(canvas, { vectors, f }) {
+/** @param {HTMLCanvasElement} canvas @param {typeof mesh} lobe @param {number} wide @param {number} high @param {number} dots in each of these units */
+function painted(canvas, { vectors, f }, wide, high, dots) {
   if (f.length === 0) return;
-  const { clientWidth: wide, clientHeight: high } = at("solid");
-  const dots = window.devicePixelRatio || 1;
   const [width, height] = [Math.round(wide * dots), Math.round(high * dots)];
   if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
   const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));

@@ -4,8 +4,9 @@ import { once } from "./answers.js";
 import { ask } from "./api.js";
 import { at, breakable, complain, made } from "./dom.js";
 import { SERIES } from "./figures.js";
+import { byHand, originOf, valuesOf } from "./fit.js";
 import { latest } from "./latest.js";
-import { byHand, choose, chosen, on, ranked, state, valuesOf } from "./state.js";
+import { choose, chosen, on, ranked, state } from "./state.js";
 
 const SIZE = 200; // pixels, shown at half of it or more
 
@@ -28,7 +29,7 @@ async function drawAll(signal) {
   for (const id of cards.keys()) if (!fits.some((fit) => fit.id === id)) cards.delete(id);
   const wanted = fits.map((fit, rank) => {
     const { item, name } = cards.get(fit.id) ?? card(fit);
-    name.replaceChildren(made("span", { class: `swatch swatch-${rank % SERIES}` }), `${rank + 1}. `, breakable(fit.result.model));
+    name.replaceChildren(made("span", { class: `swatch swatch-${rank % SERIES}` }), `${rank + 1}. `, breakable(fit.result.model), " ", made("span", { class: "hint" }, originOf(fit)));
     item.firstElementChild?.setAttribute("aria-pressed", String(fit.id === state.chosen));
     return item;
   });
@@ -70,11 +71,12 @@ function sphereOf(fit, signal) {
  * @param {import("./state.js").Fit} fit
  * @param {Record<string, number | number[]>} values
  * @param {AbortSignal} [signal]
+ * @param {number} size in pixels
  * @returns {Promise<Blob>}
  */
-export async function pictured(fit, values, signal) {
+export async function pictured(fit, values, signal, size = SIZE) {
   const { channels, material } = fit.result;
-  const json = { material: { ...material, values }, channels, channel: state.channel, size: SIZE };
+  const json = { material: { ...material, values }, channels, channel: state.channel, size };
   return (await ask("/v1/sphere", { method: "POST", json, signal })).blob();
 }
 

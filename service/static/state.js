@@ -1,5 +1,7 @@
 /** What the page is about: the measurement, the fits, and what of them is looked at. */
 
+import { parts } from "./parts.js";
+
 /**
  * @typedef {{id: string, bytes: number, declared: Record<string, string | boolean | null>, report: any}} Dataset as GET /v1/datasets/{id} gives it
  * @typedef {{id: string, status: string, progress: any, error: string | null, request: any, result: any, job?: string,
@@ -19,6 +21,8 @@ export const state = {
   models: [],
   /** @type {Map<string, Fit>} the fits on the page by id, in the order in which they were asked for */
   fits: new Map(),
+  /** @type {Set<string>} ids of those that were asked for last */
+  asked: new Set(),
   /** @type {string | null} id of the fit that is looked at, one of `ranked` */
   chosen: null,
   channel: 0,
@@ -28,6 +32,8 @@ export const state = {
   phi: 0,
   /** @type {Record<string, number | number[]> | null} values changed by hand; null where they are the fit's */
   values: null,
+  /** @type {Set<string>} keys that keep their value when it is fitted again */
+  held: new Set(),
   /** whether somebody has chosen what is looked at, so that nothing else takes its place unasked */
   looked: false,
 };
@@ -60,23 +66,44 @@ export function about(dataset, fits = []) {
   state.dataset = dataset;
   state.samples = null;
   state.channel = 0;
-  keep(fits);
+  keep(fits, new Set(fits.map((fit) => fit.id)));
   changed("dataset");
   changed("samples");
   changed("fits");
   changed("chosen");
 }
 
-/** Show these fits of the page's measurement in place of those before. @param {Fit[]} fits */
-export function present(fits) {
-  keep(fits);
+/**
+ * Show these fits of the page's measurement in place of those before.
+ * @param {Fit[]} fits
+ * @param {Set<string>} asked ids of those that were asked for last
+ */
+export function present(fits, asked = new Set(fits.map((fit) => fit.id))) {
+  keep(fits, asked);
   changed("fits");
   changed("chosen");
 }
 
-/** @param {Fit[]} fits */
-function keep(fits) {
+/** Show fits of the page's measurement beside those before; the best of them is looked at, once there is one. @param {Fit[]} fits */
+export function add(fits) {
+  state.looked = false;
+  const asked = new Set(fits.map((fit) => fit.id));
+  present([...[...state.fits.values()].filter((fit) => !asked.has(fit.id)), ...fits], asked);
+  if (fits.some((fit) => fit.result)) {
+    best();
+    changed("chosen");
+  }
+}
+
+/** Take a fit off the page. @param {string} id */
+export function takeOff(id) {
+  present([...state.fits.values()].filter((fit) => fit.id !== id), state.asked);
+}
+
+/** @param {Fit[]} fits @param {Set<string>} asked */
+function keep(fits, asked) {
   state.fits = new Map(fits.filter(belongs).map((fit) => [fit.id, fit]));
+  state.asked = asked;
   if (!ranked().some((fit) => fit.id === state.chosen)) best();
 }
 
@@ -85,35 +112,37 @@ export function belongs(fit) {
   return state.dataset === null || fit.request.dataset === state.dataset.id;
 }
 
-/** Take what a fit of the page has come to; the best is looked at until somebody has looked around. @param {Fit} fit */
+/** Take what a fit of the page has come to; the best of those asked for last is looked at until somebody has looked around. @param {Fit} fit */
 export function arrived(fit) {
   if (!state.fits.has(fit.id)) return;
   state.fits.set(fit.id, fit);
   const before = state.chosen;
-  if (!state.looked) best();
+  if (fit.result && !state.looked) best();
   changed("fits");
   if (state.chosen !== before) changed("chosen");
 }
 
 function best() {
-  state.chosen = ranked()[0]?.id ?? null;
-  state.values = null;
+  const all = ranked();
+  const first = all.find((fit) => state.asked.has(fit.job ?? fit.id)) ?? all[0];
+  settle(first?.id ?? null);
   state.looked = false;
-  clamp();
+}
+
+/** @param {string | null} id of the fit that is looked at from now on, as it was fitted */
+function settle(id) {
+  state.chosen = id;
+  state.values = null;
+  const fit = chosen();
+  state.held = new Set(Object.keys(fit?.request.fixed ?? {}));
+  if (fit) state.channel = Math.min(state.channel, fit.result.channels.length - 1);
 }
 
 /** Look at a fit, as it was fitted. @param {string} id */
 export function choose(id) {
-  state.chosen = id;
-  state.values = null;
+  settle(id);
   state.looked = true;
-  clamp();
   changed("chosen");
-}
-
-function clamp() {
-  const fit = chosen();
-  if (fit) state.channel = Math.min(state.channel, fit.result.channels.length - 1);
 }
 
 /**
@@ -133,55 +162,31 @@ export function alter(values) {
   changed("values");
 }
 
+/** Let a parameter keep its value when it is fitted again, or no longer. @param {string} key @param {boolean} held */
+export function hold(key, held) {
+  if (held) state.held.add(key);
+  else state.held.delete(key);
+  state.looked = true;
+}
+
 /** @returns {Fit | null} the fit that is looked at, once it has a result */
 export function chosen() {
   return ranked().find((fit) => fit.id === state.chosen) ?? null;
 }
 
-/** @returns {Fit[]} those with a result, that with the lowest value of their loss first */
+/** @returns {Fit[]} those with a result, the best by `yardstick` first */
 export function ranked() {
   const done = [...state.fits.values()].filter((fit) => fit.result).flatMap(parts);
-  return done.sort((a, b) => (a.result.objective ?? Infinity) - (b.result.objective ?? Infinity));
-}
-
-/** @type {WeakMap<Fit, Fit[]>} */
-const compared = new WeakMap();
-
-/** @param {Fit} fit @returns {Fit[]} the fits of a job that compared several models, or the lone one */
-function parts(fit) {
-  if (!fit.result.comparison) return [fit];
-  const found = compared.get(fit) ?? fit.result.comparison.ranking.map((/** @type {any} */ one) => ({
-    ...fit, id: `${fit.id}.${one.rank}`, job: fit.id, rank: one.rank, request: { ...fit.request, model: one.model, models: null }, result: one.fit,
-  }));
-  compared.set(fit, found);
-  return found;
-}
-
-/** @param {Fit} fit @returns {string} the text of the model that was asked for, or of the several that were compared */
-export function nameOf(fit) {
-  return fit.request.model ?? fit.request.models.join(", ");
-}
-
-/** @param {Fit} fit @returns {Record<string, number | number[]>} the values of its material, those set by hand included */
-export function valuesOf(fit) {
-  return { ...fit.result.material.values, ...(byHand(fit) ? state.values : null) };
-}
-
-/** @param {Fit} fit @returns {boolean} whether its values are other than the fit's */
-export function byHand(fit) {
-  return state.values !== null && fit.id === state.chosen;
-}
-
-/** @param {number | number[]} value @returns {number} that of the channel which is looked at */
-export function ofChannel(value) {
-  return Array.isArray(value) ? value[Math.min(state.channel, value.length - 1)] : value;
+  const { loss, same } = yardstick();
+  const size = (/** @type {Fit} */ fit) => (same ? fit.result.objective : fit.result.errors[loss]) ?? Infinity;
+  return done.sort((a, b) => size(a) - size(b));
 }
 
 /**
- * The JSON of a fit's material with those values, in the channel which is looked at: one of 31 takes 1/31 of the time.
- * @param {Fit} fit
- * @param {Record<string, number | number[]>} values
+ * By what the fits of the page are ranked: what all of them minimised, or the error under the loss asked for last.
+ * @returns {{loss: string, same: boolean}}
  */
-export function materialOf(fit, values) {
-  return { ...fit.result.material, values: Object.fromEntries(Object.entries(values).map(([key, value]) => [key, ofChannel(value)])) };
+export function yardstick() {
+  const minimised = [...state.fits.values()].map(({ request }) => `${request.loss} ${request.robust} ${request.robust_scale} ${request.max_theta_deg}`);
+  return { loss: [...state.fits.values()].at(-1)?.request.loss, same: new Set(minimised).size < 2 };
 }

@@ -1,17 +1,23 @@
 /** Step 6: what one takes away: the report, the figures, files for other programs, a link, and code that does the same. */
 
 import { ask, hasKey } from "./api.js";
-import { at, complain, made, save } from "./dom.js";
+import { at, complain, made, save, shown } from "./dom.js";
+import { nameOf } from "./fit.js";
 import { lobeOf } from "./look.js";
+import { nameOfDataset } from "./names.js";
 import { picture } from "./solid.js";
 import { pictured } from "./sphere.js";
-import { chosen, nameOf, on, state } from "./state.js";
+import { chosen, on, state } from "./state.js";
 
 /** What a request for a fit says where nothing is asked for; the rest of it is told. @type {Record<string, unknown>} */
 const DEFAULTS = {
   loss: "cosine", optimizer: "auto", fixed: {}, gray: [], per_channel: [], seed: 0, bounds: {}, starts: [],
   robust: null, robust_scale: null, max_theta_deg: null, conserve_energy: false,
 };
+
+/** What other programs get, by format. @type {Record<string, string>} */
+const FILES = { json: "material as JSON", brdf_explorer: "shader for BRDF Explorer", mitsuba: "material for Mitsuba", radiance: "material for Radiance", merl: "MERL table" };
+const LARGE = 512; // pixels of a picture to keep
 
 /** @type {string[]} formats of GET /v1/fits/{id}/export/{format}, where this service has it */
 let formats = [];
@@ -37,14 +43,14 @@ function show() {
   const figures = ["lobes", "albedo", "residuals"].flatMap((name) => ["svg", "png"].map((kind) => button(`${name} ${kind.toUpperCase()}`, () => plot(fit, name, kind))));
   at("taking").replaceChildren(
     taken("Files",
-      button("Report", async () => save(new Blob([fit.result.report], { type: "text/plain" }), `${fit.id}.txt`)),
-      button("Result as JSON", async () => save(new Blob([JSON.stringify(fit.result, null, 2)], { type: "application/json" }), `${fit.id}.json`)),
+      button("Report", async () => save(new Blob([fit.result.report], { type: "text/plain" }), fileName(fit, "report.txt"))),
+      button("Result as JSON", async () => save(new Blob([JSON.stringify(fit.result, null, 2)], { type: "application/json" }), fileName(fit, "result.json"))),
       ...formats.map((format) => offered(fit, format)),
     ),
     ...(drawable(fit) ? [] : [taken("", made("p", { class: "hint" }, `The files of other programs hold one channel, or red, green and blue; this material has ${fit.result.channels.length}.`))]),
     taken("Figures", ...figures,
-      button("lobe in space PNG", async () => save(await picture(await lobeOf(fit)), `${fit.id}_lobe.png`)),
-      button("sphere PNG", async () => save(await pictured(fit, fit.result.material.values), `${fit.id}_sphere.png`)),
+      button("lobe in space PNG", async () => save(await picture(await lobeOf(fit), `${fit.result.model}, light at ${shown(state.theta)}°`), fileName(fit, "lobe_in_space.png"))),
+      button("sphere PNG", async () => save(await pictured(fit, fit.result.material.values, undefined, LARGE), fileName(fit, "sphere.png"))),
     ),
     made("p", { class: "hint", id: "as-it-was", hidden: state.values === null }, "All of this is of the fit as it was fitted. What you change by hand is in it once you fit again from there."),
     taken("Link", address, copy("Copy the link", address)),
@@ -52,6 +58,12 @@ function show() {
     made("p", { class: "hint" }, `${fit.request.dataset === null ? "SAMPLES stands for the samples, as the request held them" : "FILE stands for the measured file"}${hasKey() ? ", KEY for the key" : ""}.`),
     made("p", { class: "hint", role: "status", id: "copied" }),
   );
+}
+
+/** A file's name, after the measurement, the model and what it is. @param {import("./state.js").Fit} fit @param {string} what */
+function fileName(fit, what) {
+  const measurement = (nameOfDataset(fit.request.dataset)?.name ?? "fit").replace(/\.\w+$/, "");
+  return [measurement, fit.result.model, what].join("_").replace(/\([^)]*\)/g, "").replace(/[^\w.+-]+/g, "");
 }
 
 /** @param {string} title @param {...Node} things */
@@ -76,7 +88,7 @@ function drawable(fit) {
 
 /** @param {import("./state.js").Fit} fit @param {string} format */
 function offered(fit, format) {
-  const element = button(format, () => exported(fit, format));
+  const element = button(FILES[format] ?? format, () => exported(fit, format));
   element.disabled = format !== "json" && !drawable(fit);
   return element;
 }
@@ -87,14 +99,14 @@ async function plot(fit, name, kind) {
   if (name === "albedo") asked.set("phi_deg", String(state.phi));
   if (name === "lobes") asked.append("scale", state.scale), asked.append("theta_i_deg", String(state.theta));
   const answer = await ask(`/v1/fits/${fit.job ?? fit.id}/plots/${name}.${kind}?${asked}`);
-  save(await answer.blob(), `${fit.id}_${name}.${kind}`);
+  save(await answer.blob(), fileName(fit, `${name}.${kind}`));
 }
 
 /** @param {import("./state.js").Fit} fit @param {string} format */
 async function exported(fit, format) {
   const answer = await ask(`/v1/fits/${fit.job ?? fit.id}/export/${format}?rank=${fit.rank ?? 1}`);
-  const name = /filename="([^"]+)"/.exec(answer.headers.get("content-disposition") ?? "")?.[1];
-  save(await answer.blob(), name ?? `${fit.id}.${format}`);
+  const ending = /filename="[^"]*?(\.[^"]+)"/.exec(answer.headers.get("content-disposition") ?? "")?.[1] ?? `.${format}`;
+  save(await answer.blob(), fileName(fit, `${format === "json" ? "material" : format}${ending}`));
 }
 
 /** @param {string} title @param {string} text */
