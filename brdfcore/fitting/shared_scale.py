@@ -7,7 +7,6 @@ come to.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from ..formats.samples import Samples
@@ -16,7 +15,6 @@ from .asked import check, form_of, own, texts
 from .effects import AUTO, FAMILIES, RICHEST
 from .search import near_scale
 
-_SHAPES = FAMILIES[1:]
 _NEAR = 0.25  # of the scale that the climb reaches: a later shape that fits exactly would make all before it outliers
 _OTHERWISE: dict[str, Any] = {"loss": "cosine", "optimizer": "auto", "seed": 0}
 
@@ -30,12 +28,11 @@ def with_shared_scale(samples: Samples, model: str | Sequence[str], keywords: Ma
     check(samples.values.shape[1], model, azimuth_observed=samples.azimuth_observed, **keywords)
     if model != AUTO:
         return {**keywords, "robust_scale": _least(samples, texts(model), keywords)}
-    richest = RICHEST[: 1 + samples.azimuth_observed]
-    climbed = _least(samples, [effects.text() for effects in richest], keywords)
-    shaped = [
-        effects.of(family) or replace(effects, fresnel=False).of(family) for effects in richest for family in _SHAPES
-    ]
-    least = _least(samples, [effects.text() for effects in shaped if effects is not None], keywords)
+    within = [effects for effects in RICHEST if samples.azimuth_observed or not effects.anisotropic]
+    climbed, least = (
+        _least(samples, [effects.text() for effects in within if (effects.family == FAMILIES[0]) == climbs], keywords)
+        for climbs in (True, False)
+    )
     return {**keywords, "robust_scale": min(climbed, max(least, _NEAR * climbed))}
 
 
