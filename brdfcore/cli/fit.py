@@ -160,10 +160,8 @@ def _foretold(samples: "Samples", asked: dict[str, Any], result: "Fit") -> "Held
 
     from ..fitting.asked import own
 
-    model = result.model if result.ladder else asked["model"]
-    return with_bar(
-        lambda progress: bc.held_out(samples, progress=progress, **own(asked | {"model": model}, result.form))
-    )
+    asked = asked | {"model": result.model if result.ladder else asked["model"], "robust_scale": result.robust_scale}
+    return with_bar(lambda progress: bc.held_out(samples, progress=progress, **own(asked, result.form)))
 
 
 def _remote(

@@ -4,7 +4,9 @@ A generator is used up by whoever reads it first, so everything that fits severa
 anything else. What the values must be, and which keys there are, a plan checks (plan.py).
 """
 
+import math
 import operator
+import sys
 from collections.abc import Collection, Iterable, Mapping
 from numbers import Real
 from typing import Any
@@ -15,6 +17,7 @@ from torch import Tensor
 from ..errors import ParameterError, unknown_name
 
 _KEYS = ("gray", "per_channel")
+_MOST = int(sys.float_info.max)  # what a double holds
 _NUMBERS = ("robust_scale", "max_theta")
 
 
@@ -46,6 +49,8 @@ def plain(value: object) -> Any:
     if isinstance(value, list | tuple):
         each = map(plain, value)
         return list(each) if isinstance(value, list) else tuple(each)
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > _MOST:
+        return math.inf if value > 0 else -math.inf
     if isinstance(value, bool | int | float | str):
         return value
     return float(value) if isinstance(value, Real) else value

@@ -2,6 +2,8 @@
 
     error = sqrt(sum w r_i^2 / sum w)      r_i, the loss's difference at sample i, of the fit that never saw i's block
 
+of which a robust form's rho(r_i) takes the place of r_i^2.
+
 Each fold is fitted to the samples of the others, from the optimum of all, all folds as one batch; so it costs a few
 steps beside the fit itself, and finds the optimum next to that of all the data. Under `conserve_energy` each fold is a
 fit of its own.
@@ -58,6 +60,8 @@ class HeldOut:
     incidences: tuple[Incidence, ...]
     loss: str
     seconds: float  # without the fit to all samples
+    robust: str | None = None  # the form that counts the residuals, and the residual beyond which they count less
+    robust_scale: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The errors as JSON-able data, null where there is no number."""
@@ -69,12 +73,15 @@ class HeldOut:
         """The errors as plain text, a line for each incidence that was left out, the steepest last."""
         lines = [
             f"held out: error {self.error:.5g}, and {self.fitted:.5g} where fitted: root mean squares of the "
-            f"{self.loss} loss's residual, {len(self.folds)} folds in {self.seconds:.2f} s",
+            f"{self.loss} loss's residual{self._counted()}, {len(self.folds)} folds in {self.seconds:.2f} s",
             f"{'incidence [deg]':<20}{'fold':>8}{'samples':>10}{'error':>12}",
         ]
         blocks = sorted(self.incidences, key=lambda one: (one.theta, one.fold))
         lines += [f"{math.degrees(b.theta):<20.4g}{b.fold:>8}{b.samples:>10}{b.error:>12.5g}" for b in blocks]
         return "\n".join(lines)
+
+    def _counted(self) -> str:
+        return "" if self.robust is None else f", as {self.robust} counts those beyond {self.robust_scale:.4g}"
 
 
 def held_out(
@@ -120,6 +127,8 @@ def held_out(
         tuple(Incidence(t, at[i], sizes[i], error[i]) for i, t in enumerate(theta.tolist())),
         loss,
         time.perf_counter() - begun,
+        problem.plan.robust,
+        None if problem.robust_scale is None else float(problem.robust_scale[0]),
     )
 
 

@@ -37,6 +37,7 @@ from .robust import ROBUST
 from .signal_noise import noise
 
 _STEP = 5.0  # degrees between polar angles
+_EXACT, _UNTOLD = 1e-6, 1e-3  # the least noise, as shares of f, where residuals tell of it and where they do not
 _NEAR = (-8.0, -6.0, -4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0)  # degrees from the mirror direction
 _TURN = 30.0  # degrees between azimuths
 _ROUNDS = 4  # of exchanges; one or two find all there is
@@ -161,6 +162,7 @@ class _Design:
         self.problem, self.x, self.fit = problem, x, fit
         samples, data = fit.samples, problem.data
         f = torch.cat([problem.f(x, piece) for piece in data.chunks(problem.channels)], -1)  # (1, C, N)
+        self.least = 1e-300
         if samples.sigma is not None:
             self.noise = noise(samples.sigma.T.square().reshape(-1), f.reshape(-1))
             known = samples.sigma.T.square().unsqueeze(0)
@@ -174,7 +176,11 @@ class _Design:
                 values.append(own[counted])
                 at += len(piece.c)
             self.noise = noise(torch.cat(squares) / left, torch.cat(values))
-            known = self.noise.variance(f)
+            # residuals of an exact fit are rounding; those of as many samples as values say nothing of the noise
+            size = float(f.square().mean().sqrt()) or 1.0
+            told = sum(map(len, values)) > problem.size
+            self.least = ((_EXACT if told else _UNTOLD) * size) ** 2
+            known = self.noise.variance(f).clamp(min=self.least)
         size = problem.size
         a, b = torch.zeros(size, size, dtype=torch.float64), torch.zeros(size, size, dtype=torch.float64)
         total, at = 0.0, 0
@@ -195,7 +201,7 @@ class _Design:
         problem, samples = self.problem, self.fit.samples
         with torch.no_grad():
             f = self.fit.material.f(wi, wo).expand(-1, problem.channels)
-        variance = self.noise.variance(f).clamp(min=1e-300)
+        variance = self.noise.variance(f).clamp(min=self.least)
         weight, cell = (None if w is None else w.mean().expand(len(wi)) for w in (samples.weight, samples.cell))
         sigma = None if samples.sigma is None else variance.sqrt()
         new = Samples(wi, wo, f, samples.channels, sigma, weight=weight, cell=cell)

@@ -165,10 +165,18 @@ def _found(
 
 
 def _subset(samples: Sequence[Samples], seed: int) -> list[Samples]:
-    """Those of the samples on which starts are told apart, the same of every material; all where they are few."""
+    """Those of the samples on which starts are told apart, the same of every material; all where they are few.
+
+    What has no weight in any material is not among them.
+    """
     if len(samples[0]) <= SUBSET:
         return list(samples)
-    chosen = torch.randperm(len(samples[0]), generator=torch.Generator().manual_seed(seed))[:SUBSET].sort().values
+    order = torch.randperm(len(samples[0]), generator=torch.Generator().manual_seed(seed))
+    weights = [one.weight for one in samples]
+    if all(weight is not None for weight in weights):
+        heavy = torch.stack([weight > 0 for weight in weights if weight is not None]).any(0)
+        order = order[heavy[order]]
+    chosen = order[:SUBSET].sort().values
     return [one.subset(chosen) for one in samples]
 
 

@@ -142,6 +142,7 @@ def select(
     result = fit(samples, chosen.model, progress=Teller(progress, 0.8, 0.2).relay, **final)
     return replace(
         result,
+        plan=replace(result.plan, starts=result.plan.starts[:-1]),  # those that were asked for
         ladder=tuple(ladder.rungs),
         choices=(*result.choices, ended),
         cost=replace(result.cost, seconds=time.perf_counter() - begun),

@@ -26,6 +26,8 @@ def with_shared_scale(samples: Samples, model: str | Sequence[str], keywords: Ma
         return dict(keywords)
     check_samples(samples)
     check(samples.values.shape[1], model, azimuth_observed=samples.azimuth_observed, **keywords)
+    if not bool(samples.values.any()):  # fitted exactly by every model, at whatever scale
+        return dict(keywords)
     if model != AUTO:
         return {**keywords, "robust_scale": _least(samples, texts(model), keywords)}
     within = [effects for effects in RICHEST if samples.azimuth_observed or not effects.anisotropic]

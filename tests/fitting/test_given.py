@@ -151,3 +151,18 @@ def test_samples_at_the_limiting_angle_stay(single: bool) -> None:
         for degrees in (1, 20, 45, 80, 89):
             fit = bc.fit(there, "lambert", max_theta=math.radians(degrees))
             assert len(fit.samples) == degrees
+
+
+@pytest.mark.parametrize(
+    "keywords",
+    [
+        {"robust": "cauchy", "robust_scale": 10**400},
+        {"max_theta": 10**400},
+        {"bounds": {"lambert.kd": (0, 10**400)}},
+        {"fixed": {"lambert.kd": -(10**400)}},
+        {"starts": [{"lambert.kd": 10**400}]},
+    ],
+)
+def test_a_whole_number_beyond_any_double_is_a_sentence(keywords: dict[str, Any]) -> None:
+    with pytest.raises(BrdfError, match=r"^Expected .*inf"):
+        bc.fit(measured_from("lambert(kd=0.2)", count=20), "lambert", **keywords)

@@ -190,3 +190,13 @@ def test_outliers_that_a_robust_form_sees_do_not_decide() -> None:
     of_good, of_robust, of_plain = (bc.next_directions(fit, 8).information for fit in fits)
     assert of_robust == pytest.approx(of_good, rel=0.2)
     assert of_plain < 0.5 * of_good
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_fit_that_leaves_no_residuals_has_next_directions(count: int) -> None:
+    """Its residuals are rounding, which tells nothing of the noise."""
+    few = measured_from("lambert(kd=0.2) + ward_bounded(isotropic, rs=0.1, a=0.15)", noise=0.003, count=10)
+    for first in range(8):
+        fit = bc.fit(few.subset(torch.arange(first, first + count)), "lambert + ward_bounded(isotropic)")
+        proposed = json.loads(json.dumps(bc.next_directions(fit, 1).to_dict(), allow_nan=False))
+        assert all(0 < share <= 1 for share in proposed["shrinkage"].values())

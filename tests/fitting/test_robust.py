@@ -238,3 +238,26 @@ def test_a_result_says_what_it_was_asked() -> None:
     plain = bc.fit(good, MODEL)
     assert plain.robust_scale is None
     assert "robust" not in plain.report()
+
+
+def test_models_of_data_that_are_all_zero_are_compared() -> None:
+    given = measured_from(TRUE, count=50)
+    zero = bc.Samples(given.wi, given.wo, torch.zeros(50, dtype=torch.float64))
+    assert bc.compare(zero, ["lambert", TRUE], robust="cauchy").best.objective == 0
+    assert bc.fit(zero, ["lambert", TRUE], robust="cauchy").objective == 0
+
+
+def test_the_samples_that_tell_starts_apart_have_weight() -> None:
+    many, weight = measured_from(TRUE, count=4000, noise=0.003), torch.zeros(4000, dtype=torch.float64)
+    weight[torch.randperm(4000, generator=torch.Generator().manual_seed(0))[3000:3100]] = 1.0
+    some = bc.Samples(many.wi, many.wo, many.values, weight=weight)
+    compared = bc.compare(some, ["lambert", "lambert + ward_bounded(isotropic)"], robust="cauchy")
+    assert float(compared.best.parameters["lambert.kd"]) == pytest.approx(0.2, rel=0.02)
+
+
+def test_held_out_errors_say_how_a_robust_form_counts_them() -> None:
+    samples = measured_from(TRUE, count=60, noise=0.003)
+    found = bc.held_out(samples, "lambert", robust="cauchy", robust_scale=0.25)
+    assert (found.robust, found.robust_scale) == ("cauchy", 0.25)
+    assert "the cosine loss's residual, as cauchy counts those beyond 0.25, 5 folds" in str(found)
+    assert ", as " not in str(bc.held_out(samples, "lambert"))

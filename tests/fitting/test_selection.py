@@ -284,3 +284,10 @@ def test_one_incidence_does_not_decide_what_is_foretold(measured: pathlib.Path) 
     fit = bc.fit(paint, texts)
     assert [rung.kept for rung in fit.ladder] == [True, True]
     assert fit.ladder[1].held_out < 0.7 * fit.ladder[0].held_out
+
+
+def test_the_starts_of_a_result_are_those_that_were_asked_for() -> None:
+    samples = measured_from(TRUE, count=60, noise=0.01)
+    asked = [{"lambert.kd": 0.1}]
+    assert bc.fit(samples, ["lambert", "lambert + ward_bounded"]).to_dict()["options"]["starts"] == []
+    assert bc.fit(samples, ["lambert", "lambert + ward_bounded"], starts=asked).to_dict()["options"]["starts"] == asked
