@@ -290,4 +290,5 @@ def test_the_starts_of_a_result_are_those_that_were_asked_for() -> None:
     samples = measured_from(TRUE, count=60, noise=0.01)
     asked = [{"lambert.kd": 0.1}]
     assert bc.fit(samples, ["lambert", "lambert + ward_bounded"]).to_dict()["options"]["starts"] == []
-    assert bc.fit(samples, ["lambert", "lambert + ward_bounded"], starts=asked).to_dict()["options"]["starts"] == asked
+    told = bc.fit(samples, ["lambert", "lambert + ward_bounded"], starts=asked).to_dict()["options"]["starts"]
+    assert [start["lambert.kd"] for start in told] == [[0.1, 0.1, 0.1]]
