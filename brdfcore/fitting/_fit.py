@@ -90,15 +90,16 @@ def fit(
         "max_theta": max_theta,
         "conserve_energy": conserve_energy,
     }
-    keywords = plainly(given)
+    begun, keywords = time.perf_counter(), plainly(given)
     if not isinstance(model, str) or model == AUTO:
         from .selection import select  # which makes its fits here
         from .shared_scale import with_shared_scale
 
+        Teller(progress)("scan", 0.0, math.nan)  # the scale of a robust form takes as long as some rungs
         chosen = select(samples, model, progress, **with_shared_scale(samples, model, keywords))
-        return replace(chosen, choices=(*chosen.choices, *_of_the_choice(chosen, keywords)))
+        cost = replace(chosen.cost, seconds=time.perf_counter() - begun)
+        return replace(chosen, cost=cost, choices=(*chosen.choices, *_of_the_choice(chosen, keywords)))
     seed = keywords["seed"]
-    begun = time.perf_counter()
     plan, (kept,) = planned([samples], model, **keywords)
     say = Teller(progress)
     found = search(plan, [kept], loss, optimizer, seed, say)

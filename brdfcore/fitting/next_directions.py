@@ -202,7 +202,7 @@ class _Design:
         with torch.no_grad():
             f = self.fit.material.f(wi, wo).expand(-1, problem.channels)
         variance = self.noise.variance(f).clamp(min=self.least)
-        weight, cell = (None if w is None else w.mean().expand(len(wi)) for w in (samples.weight, samples.cell))
+        weight, cell = (None if w is None else w[w > 0].mean().expand(len(wi)) for w in (samples.weight, samples.cell))
         sigma = None if samples.sigma is None else variance.sqrt()
         new = Samples(wi, wo, f, samples.channels, sigma, weight=weight, cell=cell)
         data = Data.of([new], problem.plan.form.needs, problem.loss_kind, problem.data.scales)

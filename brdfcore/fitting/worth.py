@@ -175,11 +175,11 @@ def _message(
         parts = [f"The optimizer stopped before the optimum; treat values and intervals with care, or {advice}."]
     on_end = [key for key, at in problem.slices.items() if any(held[at])]
     if on_end:
-        where = " in some channel" if problem.channels > 1 else ""
+        where = _of_channels(problem, on_end)
         parts.append(f"{', '.join(on_end)} ended on an end of the box{where}, so no interval is given there.")
     near_end = [key for key, at in problem.slices.items() if any(by_chance[at])]
     if near_end:
-        where = " in some channel" if problem.channels > 1 else ""
+        where = _of_channels(problem, near_end)
         parts.append(
             f"{', '.join(near_end)} ended on an end of the box{where}, where noise alone may have put it, so the "
             "interval reaches inwards from there."
@@ -207,3 +207,9 @@ def _message(
             f"Residuals were counted in sigma and made {problem.plan.robust}, so the minimised loss is not chi-square."
         )
     return " ".join(parts)
+
+
+def _of_channels(problem: Problem, keys: Sequence[str]) -> str:
+    """What a sentence on values adds where some of them are one a channel."""
+    several = any(problem.slices[key].stop - problem.slices[key].start > 1 for key in keys)
+    return " in some channel" if several else ""
