@@ -8,7 +8,7 @@ from torch import Tensor
 
 from .. import __version__
 from ..formats.samples import Samples
-from .data import stacked_weights
+from .data import is_weighed, stacked_weights
 from .identifiability import name_of, named
 from .levenberg_marquardt import Outcome
 from .losses import root_mean
@@ -32,7 +32,7 @@ def fits(
     The cost of each is asked for when all but their writing down is done.
     """
     plan, x, channels = problem.plan, outcome.x, fitted[0].channels
-    weighed = problem.loss_kind.statistical and fitted[0].sigma is not None and fitted[0].weight is None
+    weighed = is_weighed(fitted[0], problem.loss_kind)
     known = uncertainty(problem, x, outcome.gram)
     values = {key: value.squeeze(1).expand(len(x), -1) for key, value in _rows(problem, x).items()}
     described = _described(problem, values, known)
